@@ -1,14 +1,14 @@
-//! Gives the program the hash of what it is built from, and hands the linker the memory map of the board that a feature names.
+//! Sets the hash of the program's sources, and gives the linker the memory map of the board that a feature names.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// What the name of a board's feature begins with, as cargo spells it here. The rest is the name of its memory map.
+/// Prefix of the features that name a board, as cargo spells them here. The rest is the name of its memory map.
 const BOARD: &str = "CARGO_FEATURE_BOARD_";
 
-/// Folders and files that a program is built from, seen from this package: what it retains over a restart is not for a program of
-/// other sources.
+/// Folders and files that a program is built from, relative to this package. State that a program retains over a restart is not valid for a
+/// program of other sources.
 const SOURCES: [&str; 8] = [
     "src",
     "memory",
@@ -29,7 +29,7 @@ fn main() {
     fs::copy(format!("memory/{board}.x"), out.join("memory.x")).expect("the memory map is copied");
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rustc-link-search={}/memory", env::var("CARGO_MANIFEST_DIR").expect("cargo sets it"));
-    // Functions that are the same to the byte are linked once.
+    // Functions with identical code are linked once.
     for argument in ["--nmagic", "--icf=all", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo:rustc-link-arg-bins={argument}");
     }
@@ -50,7 +50,7 @@ fn build_hash() -> u32 {
     hasher.finish() as u32
 }
 
-/// Adds the names and contents of the files of a folder in the order of their names; of what does not exist the name alone.
+/// Hashes the names and contents of the files of a folder in the order of their names; for a missing file the name alone.
 fn hash_files(path: &Path, hasher: &mut DefaultHasher) {
     path.hash(hasher);
     if let Ok(entries) = fs::read_dir(path) {

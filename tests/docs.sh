@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Writes what is generated in the documentation, and shows what has changed: ./tests/docs.sh [ARGUMENTS OF CARGO, such as --package reports]
+# Writes the generated parts of the documentation, and shows the changes: ./tests/docs.sh [ARGUMENTS OF CARGO, such as --package reports]
 #
-# A generated part stands in a page between `<!-- begin NAME -->` and `<!-- end NAME -->` (tests/src/generated.rs). The tests whose names
-# have the words `in_the_docs` make it; run without this script, they fail where a part is not what they make of it.
+# A generated part is in a page between `<!-- begin NAME -->` and `<!-- end NAME -->` (tests/src/generated.rs). The tests whose names
+# contain `in_the_docs` generate it. Without this script they fail if a part differs from the generated text.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Has libFuzzer look for bytes that break a promise: tests/fuzz.sh [SECONDS] [TARGET...], of all targets if none is named, each for 10 s.
+# Searches with libFuzzer for bytes that break a guarantee: tests/fuzz.sh [SECONDS] [TARGET...]. The default is all targets, each for 10 s.
 #
-# It tries the same bytes each time; SEED=2 has it try others. SEED=0 is one by the clock.
-# Needs a C++ compiler. The crates of this workspace are compiled with counters of the edges of their code, by flags that stable Rust has;
-# those of others as the tests compile them. Each target begins with the bytes that are kept, in `tests/fuzz/corpus`; what is found is left in
-# `target/fuzz`, in `TARGET/` what reached new code, as `TARGET-crash-…` what broke a promise. Ends with an error if there is such a thing.
+# Each run tries the same bytes. SEED=2 selects others, and SEED=0 a seed from the clock.
+# Needs a C++ compiler. The crates of this workspace are compiled with counters of the edges of their code, by flags of stable Rust; other
+# crates are compiled as for the tests. Each target starts with the bytes in `tests/fuzz/corpus`. Bytes that reach new code are written to
+# `target/fuzz/TARGET/`, and bytes that break a guarantee to `target/fuzz/TARGET-crash-…`. The exit code is not 0 if there are such bytes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,7 +15,7 @@ targets=("$@")
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 mkdir -p "$TARGET/fuzz"
 
-# Called in the place of rustc for the crates of the workspace. What runs while they are compiled is not searched.
+# Cargo calls this instead of rustc for the crates of the workspace. Build scripts and procedural macros get no counters.
 cat >"$TARGET/fuzz/rustc" <<'WRAPPER'
 #!/bin/sh
 case " $* " in *" --crate-name build_script_"* | *" proc-macro "*) exec "$@" ;; esac
@@ -27,7 +27,7 @@ RUSTC_WRAPPER='' RUSTC_WORKSPACE_WRAPPER=$TARGET/fuzz/rustc cargo build --locked
     fuzz/libfuzzer,adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt
 cp "$TARGET/debug/examples/fuzz" "$TARGET/fuzz/fuzz"
 
-# The kept bytes are copied: libFuzzer adds what it finds to the first folder. Each simulated device leaks its statics, 0.1 MB.
+# libFuzzer writes only to its first folder, so the corpus is not changed. Each simulated device leaks 0.1 MB of static variables.
 fuzz() {
     local found=$TARGET/fuzz/$1 limit_mb=1000
     [ "$1" != commands ] || limit_mb=$((limit_mb + 20 * seconds))

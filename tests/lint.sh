@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Cargo calls this in the place of rustc for the crates of the workspace (RUSTC_WORKSPACE_WRAPPER): clippy reads the crate first, and only what
-# it has nothing to say about is compiled. So the dependencies are compiled once for lints and tests, and clippy, which switches off
-# optimisations of its own process, does not make the program.
-# In bash: dash drops variables such as CARGO_BIN_EXE_imunoise.
+# Cargo calls this instead of rustc for the crates of the workspace (RUSTC_WORKSPACE_WRAPPER). Clippy checks a crate first, and rustc
+# compiles it only if clippy finds nothing. So the dependencies are compiled once for lints and tests, and the program is not built by
+# clippy, which disables optimisations in its own process.
+# This is a bash script, since dash drops variables such as CARGO_BIN_EXE_imunoise.
 set -eu
 rustc=$1
 shift
-case " $* " in *" --emit="*) ;; *) exec "$rustc" "$@" ;; esac # a question about the compiler
+case " $* " in *" --emit="*) ;; *) exec "$rustc" "$@" ;; esac # a query of the compiler's properties
 
-# The arguments for clippy: no code, no file that stays, and no message to cargo that a file is there.
+# Runs clippy with changed arguments: it generates no code, leaves no file, and reports no file to cargo.
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 lint() {
@@ -26,8 +26,8 @@ lint() {
     done
     clippy-driver "$rustc" "$@" -D warnings
 }
-# A library of the host is read by clippy as it is compiled for its own tests, which have all of its code. Code that only they use is
-# found by rustc, here.
+# Clippy checks a library of the host when it is compiled for its own tests, which include all of its code. Without its tests
+# it is compiled by rustc alone, which finds code that only the tests use.
 case " $* " in
     *" --test "* | *" --target "* | *" --crate-type bin "*) ;;
     *) grep -q '^test = false' "$CARGO_MANIFEST_DIR/Cargo.toml" || exec "$rustc" "$@" -D warnings ;;

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Changes single operators and values of what decodes, estimates and fits, and lists the changes that no test notices:
-# tests/mutants.sh [SEED [NUMBER [AREA...]]], without arguments by seed 1, 40 in each of the areas driver, cascade, gaps, fit and wire.
+# Changes single operators and values in the code that decodes, estimates and fits, and lists the changes that no test notices:
+# tests/mutants.sh [SEED [NUMBER [AREA...]]]. The default is seed 1, and 40 changes in each area: driver, cascade, gaps, fit, wire.
 #
-# Needs cargo-mutants (`cargo install cargo-mutants`). The tests are those of the changed crate: first those that are about the area, then,
-# for what they do not notice, all. Prints a line for each change that is left; `target/mutants/AREA` has the others. cargo-mutants tries the
-# deletions of fields in a chosen file whether they are chosen or not.
+# Needs cargo-mutants (`cargo install cargo-mutants`). A change is tested by the tests of its crate for its area and, if they do not notice
+# it, by all tests of the crate. Prints a line for each unnoticed change; `target/mutants/AREA` has the others. cargo-mutants tries all
+# deletions of fields in a selected file, even if they are not drawn.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -27,7 +27,7 @@ for area in "${areas[@]}"; do
         allan-core) features=(--features host,serde) ;;
         *) features=() ;;
     esac
-    export CARGO_TARGET_DIR=$TARGET/mutants/build-$crate # dependencies are compiled once
+    export CARGO_TARGET_DIR=$TARGET/mutants/build-$crate # compiles dependencies once
     out=$TARGET/mutants/$area
     rm -rf "$out"
     mkdir -p "$out"
@@ -35,7 +35,7 @@ for area in "${areas[@]}"; do
     python3 -c 'import random, sys
 lines = sys.stdin.read().splitlines()
 print(*random.Random(int(sys.argv[1])).sample(lines, min(int(sys.argv[2]), len(lines))), sep="\n")' "$seed" "$number" <"$out/all.txt" >"$out/drawn.txt"
-    # Tries the changes that stand in a file, with these arguments of `cargo test`; 2 and 3 say that changes or timeouts are left.
+    # Tries the changes listed in a file, with these arguments of `cargo test`. Exit codes 2 and 3 report unnoticed changes or timeouts.
     try() {
         local name=$1 list=$2 status=0
         sed 's/[][\.*^$+?(){}|]/\\&/g; s/.*/--re=^&$/' "$list" >"$out/$name.patterns"

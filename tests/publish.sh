@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Whether the two published libraries are complete: files of the packages, the packages' own tests, the oldest Rust and the
-# oldest direct dependencies that they build with. ./tests/publish.sh
+# Checks that the two published libraries are complete: the files and the tests of their packages, and that they build with the oldest
+# Rust and the oldest direct dependencies: ./tests/publish.sh
 #
-# Needs rustup, which installs the toolchains 1.85, 1.88 and nightly if they are missing (nightly alone resolves minimal versions).
+# Needs rustup, which installs the toolchains 1.85, 1.88 and nightly if they are missing (only nightly resolves minimal versions).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -27,7 +27,7 @@ check() { # PACKAGE OLDEST_RUST
     done
     (
         cd "$directory"
-        # As a user builds it: alone, with all features, with its own tests.
+        # The package is built as by a user: alone, with all features, with its own tests.
         run cargo test --quiet --no-run --all-features --target-dir "$TARGET/tests"
         run cargo "+$oldest" check --quiet --all-features --target-dir "$TARGET/$oldest"
         # Tests need newer versions of their dependencies than the library.
@@ -42,7 +42,7 @@ grep -q '^repository' Cargo.toml || echo "before a release: state the public add
 check adis16405-driver 1.85
 check allan-core 1.88
 
-# The interface against that of the last release.
+# The interfaces must be compatible with the last release.
 last=$(git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null || true)
 if [ -z "$last" ]; then
     echo "the interfaces are not compared: no release is tagged v…"

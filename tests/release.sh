@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Makes what a release consists of, in one folder: ./tests/release.sh [FOLDER]
+# Builds all files of a release into one folder: ./tests/release.sh [FOLDER]
 #
-# The packages of both libraries (each with `cargo publish --dry-run`), the Python wheel, the image of every board as an ELF and as
-# the file that its boot loader takes, the program, the page for browsers as one file, and SHA256SUMS over all of them. Publishes nothing. The folder is
-# target/release-VERSION if none is named. Needs what tests/run.sh installs, and a tree without changes: a package is made of what is
-# committed.
+# These are the packages of both libraries (each with `cargo publish --dry-run`), the Python wheel, the image of every board as an ELF and
+# as the file for its boot loader, the program, the page for browsers as one file, and SHA256SUMS of all of them. Publishes nothing. The
+# default folder is target/release-VERSION. Needs the tools that tests/run.sh installs, and a tree without uncommitted changes, since a
+# package contains only committed files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,19 +19,19 @@ run() { printf '+ %s\n' "$*"; "$@"; }
 # The libraries; neither needs the other.
 for package in adis16405-driver allan-core; do
     run cargo publish --dry-run --locked --package "$package" --target-dir "$target/publish"
-    # A dry run does not say where its package is.
+    # A dry run does not print the path of its package.
     run cargo package --quiet --locked --no-verify --package "$package" --target-dir "$target/publish"
     cp "$target/publish/package/$package-$version.crate" "$out"
 done
 
-# Python: the module and the command in one wheel.
+# The Python module and the command are in one wheel.
 python=$target/python/bin
 [ -x "$python/pip" ] || { echo "no $python: run ./tests/run.sh once, which installs it" >&2; exit 1; }
-# For every Linux with a C library as old as that of the build, or older than what the wheel needs (manylinux).
+# maturin tags the wheel with the oldest C library that has the symbols that it needs (manylinux).
 PATH=$python:$PATH run "$python/maturin" build --quiet --release --locked --manifest-path host-sim/python/Cargo.toml \
     --target-dir "$target" --out "$out"
 
-# The program, optimised over all crates, which the everyday build is not.
+# The release profile optimises the program across all crates; the profile of the tests does not.
 run cargo build --locked --release --package host-sim --target-dir "$target"
 cp "$target/release/imunoise" "$out"
 

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--quick | --long | --recordings]
+# Runs every check and test of the noise observatory from a clean checkout: ./tests/run.sh [--quick | --long | --recordings]
 #
-# Needs rustup with its default toolchain, a C compiler and Python 3.11 or later. Installs, with a message, what else is
-# missing: by rustup, by apt-get (as root, or with sudo), and from PyPI into the target folder: the packages of
-# tests/requirements.txt, and Node.js with npm, for the emulator of the Pico.
+# Needs rustup with its default toolchain, a C compiler and Python 3.11 or later. Installs all other missing tools, with a message: by
+# rustup, by apt-get (as root, or with sudo), and from PyPI into the target folder the packages of tests/requirements.txt, and Node.js
+# with npm for the emulator of the Pico.
 #
-# Without an option: what a pull request needs. --quick: formatting, lints, and the unit tests of the libraries and of the host.
-# --long: also the tests that are marked `#[ignore = "long: …"]`, those on local clusters of Ray and Spark, for which it installs both
-# and Java, and the search for bytes that break a reader. Tests on measured
-# recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/measured.md); --recordings runs those alone that the
-# last run skipped for that reason, and none may be skipped again.
-# The last lines have the seconds of each step, of the clock and of the processor, and how many tests passed, failed and were skipped.
+# Without an option it runs the checks for a pull request. --quick runs formatting, lints, and the unit tests of the libraries and of the
+# host. --long also runs the tests that are marked `#[ignore = "long: …"]`, the tests on local clusters of Ray and Spark, for which it
+# installs both and Java, and the search for bytes that break a reader. Tests on measured recordings are skipped if ADIS_RECORDINGS does
+# not name their folder (docs/measured.md). --recordings runs only the tests that the last run skipped for this reason; none may be
+# skipped again.
+# The last lines are the seconds of each step by the clock and of the processor, and the numbers of passed, failed and skipped tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -54,10 +54,10 @@ case "${1-}" in
 esac
 
 run() { printf '+ %s\n' "$*"; "$@"; }
-# One choice of crates and features, so that nothing is built twice.
+# All steps use these crates and features, so that no crate is built twice.
 FEATURES=(--locked --workspace --features
     adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt)
-# Clippy reads every crate of the workspace that is compiled: those of the tests, and those of the images that the tests build.
+# Clippy checks every crate of the workspace that is compiled, including the images that the tests build.
 export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/lint.sh CARGO_INCREMENTAL=0
 nextest() { run "$TARGET/python/bin/cargo-nextest" nextest run "${FEATURES[@]}" --show-progress none "$@"; }
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
@@ -127,7 +127,7 @@ build() {
     (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
     export IMUNOISE=$TARGET/debug/imunoise # the program as just built
 }
-examples() { # workspaces with the same frameworks, which are compiled once for each core
+examples() { # workspaces that share frameworks, which are compiled once for each core
     local workspace core
     for workspace in adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m adis16405-driver/examples-rp2040; do
         core=$MCU
@@ -139,10 +139,10 @@ examples() { # workspaces with the same frameworks, which are compiled once for 
         )
     done
 }
-systems() { # what needs no compiler of C
+systems() { # crates that need no C compiler
     (
         unset RUSTC_WORKSPACE_WRAPPER
-        export RUSTFLAGS="-D warnings" # clippy measures types, whose sizes are those of the system
+        export RUSTFLAGS="-D warnings" # without clippy, whose lints on the sizes of types depend on the system
         run cargo check --quiet --locked --target "$WINDOWS" --no-default-features --features host-sim/hdf5 --package host-sim
     )
 }
@@ -187,12 +187,12 @@ unit_tests() { nextest --lib 2>&1 | tee -a "$log"; }
 search() { run tests/fuzz.sh 10; }
 recordings() {
     nextest "${chosen[@]}" 2>&1 | tee -a "$log"
-    # What was skipped again is printed at the end. Each name has to be that of a test.
+    # Tests that are skipped again are printed at the end. Each listed name must be a test.
     [ ! -s "$SKIPPED_TESTS" ] && [ "$(sed -n 's/^ *Summary .* \([0-9]*\) tests\? run: .*/\1/p' "$log")" -ge "$(grep -c . "$WITHOUT_RECORDINGS")" ]
 }
 
 clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
-# Seconds of the processor, in user and in system mode, of all processes that have ended (proc(5): cutime, cstime).
+# Prints the processor seconds, in user and in system mode, of all ended processes (proc(5): cutime, cstime).
 processor() { awk -v hz="$(getconf CLK_TCK)" '{ sub(/.*\) /, ""); printf "%.0f", ($14 + $15) / hz }' "/proc/$$/stat"; }
 row() { table+=$(printf '%6d s %6d s  %s' $((SECONDS - began)) $(($(processor) - worked)) "$title$1")$'\n'; }
 # Prints the seconds of each step, the skipped tests, and the totals of all test runs.
@@ -209,8 +209,8 @@ conclude() {
                 if ($i ~ /^skipped/) ignored += $(i - 1)
             }
         }
-        /^test result: / { passed += $4; failed += $6; ignored += $8 } # of the documentation
-        /^[0-9]+ passed.* in [0-9.]+s/ { passed += $1 } # pytest; one that failed ends the run
+        /^test result: / { passed += $4; failed += $6; ignored += $8 } # counts of the documentation tests
+        /^[0-9]+ passed.* in [0-9.]+s/ { passed += $1 } # counts of pytest; a failed test ends the run
         END { printf "%d passed, %d failed, %d skipped\n", passed - skipped, failed, skipped + ignored }' "$log"
     rm -f "$log" "$SKIPPED_TESTS"
 }

@@ -125,7 +125,7 @@ impl Alarm {
         }
     }
 
-    /// From the values of ALM_CTRL, ALM_MAG and ALM_SMPL; `None` if the alarm has no source.
+    /// The alarm in ALM_CTRL, ALM_MAG and ALM_SMPL; `None` if it has no source.
     fn from_registers(number: AlarmNumber, control: u16, magnitude: u16, samples: u16) -> Option<Self> {
         let code = control >> number.source_shift() & 0xF;
         let source = *Channel::ALL.get(usize::from(code).checked_sub(1)?)?;
@@ -164,7 +164,7 @@ impl Protocol<'_> {
                 return Err(Error::Value { register: number.magnitude(), value: i32::from(value) });
             }
         }
-        // Off while its registers change, so that a half-written setting cannot raise the alarm.
+        // The alarm is off while its registers change: a half-written setting could raise it.
         self.update_register(Register::AlmCtrl, mask, 0).await?;
         if let Some(alarm) = alarm {
             self.set_register(number.magnitude(), alarm.magnitude()).await?;

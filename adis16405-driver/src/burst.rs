@@ -145,7 +145,7 @@ impl Burst {
 pub struct Counts([i16; 12]);
 
 impl Counts {
-    /// From counts in burst order ([`Channel::ALL`]).
+    /// The counts of an array in burst order ([`Channel::ALL`]).
     pub const fn new(counts: [i16; 12]) -> Self {
         Self(counts)
     }

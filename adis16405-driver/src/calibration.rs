@@ -27,8 +27,8 @@ impl GyroBias {
     }
 }
 
-/// Corrections that a factory restore has set to 0 (data sheet Rev. B, Tables 10 to 12, page 13); not the soft-iron
-/// factors.
+/// The corrections that a factory restore set to 0 (data sheet Rev. B, Tables 10 to 12, page 13). It does not change
+/// the soft-iron factors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -120,7 +120,7 @@ impl Protocol<'_> {
             self.state.x_sign_at_risk = false;
             part[0] = 0;
         }
-        // A correction in the part, by auto-null or from flash, is the whole one.
+        // A nonzero XGYRO_OFF, from auto-null or flash, replaces the driver's correction: it is the whole one.
         if x != 0 {
             self.state.host_bias_x = x.min(0);
         }

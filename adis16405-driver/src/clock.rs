@@ -101,7 +101,7 @@ impl SamplePeriod {
         Ok(Self::least(|period| (period.hz_f32() - hz).abs()))
     }
 
-    /// The period with the least `error`, the shortest of several.
+    /// The period with the least `error`, the shortest if several have it.
     fn least<T: PartialOrd>(error: impl Fn(Self) -> T) -> Self {
         let periods = (0x02..=0xFF).map(|smpl_prd| Self { smpl_prd });
         periods.fold(Self::RESET, |best, period| if error(period) < error(best) { period } else { best })
@@ -116,7 +116,7 @@ impl SamplePeriod {
         if millihz == 0 {
             return Err(ConfigError::Rate);
         }
-        // Above the fastest rate the fastest is the nearest. With this limit rate · ticks is below 2³².
+        // The fastest rate is the nearest to any higher one. This limit keeps rate · ticks below 2³².
         let millihz = if millihz > 819_200 { 819_200 } else { millihz };
         let mut best = Self::RESET;
         let mut smpl_prd = 0x01;
@@ -136,7 +136,7 @@ impl SamplePeriod {
         }
     }
 
-    /// From the value of SMPL_PRD; `None` for 0x00, which selects the external clock.
+    /// The period that a value of SMPL_PRD selects; `None` for 0x00, the external clock.
     pub const fn from_register(smpl_prd: u8) -> Option<Self> {
         if smpl_prd == 0 { None } else { Some(Self { smpl_prd }) }
     }
@@ -213,7 +213,7 @@ pub enum SampleClock {
     External,
 }
 
-/// Why a sample period or a [`Config`](crate::Config) was refused.
+/// The reason for which a sample period or a [`Config`](crate::Config) was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -263,9 +263,9 @@ impl core::error::Error for ConfigError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PerClockMode {
-    /// In [`ClockMode::Normal`].
+    /// The time in [`ClockMode::Normal`].
     pub normal: u32,
-    /// In [`ClockMode::LowPower`].
+    /// The time in [`ClockMode::LowPower`].
     pub low_power: u32,
 }
 
@@ -303,15 +303,15 @@ pub struct Timing {
     pub word_gap_ns: u32,
     /// Largest SMPL_PRD value in normal mode: 0x08 by Table 7, 0x09 by Tables 1 and 2 and by page 13.
     pub normal_mode_max_smpl_prd: u8,
-    /// From power-on to the first answer, µs: 220 ms, or 290 ms in low-power mode (Table 1), the default.
+    /// Time from power-on to the first answer, µs: 220 ms, or 290 ms in low-power mode (Table 1), the default.
     pub start_up_us: u32,
-    /// From a reset to the first answer, µs: 100 ms, or 170 ms in low-power mode (Table 1), the default.
+    /// Time from a reset to the first answer, µs: 100 ms, or 170 ms in low-power mode (Table 1), the default.
     pub reset_us: u32,
     /// Length of the low pulse on the reset line, µs. The data sheet gives none; 10 µs are usual in the family.
     pub reset_pulse_us: u32,
     /// Chip-select pulse that wakes the part, ns: at least 20 µs (Table 1), and 5 µs for the microcontroller's clock.
     pub wake_pulse_ns: u32,
-    /// From wake-up until the part answers, µs: 4 ms, or 15 ms in low-power mode (Table 1).
+    /// Time from wake-up until the part answers, µs: 4 ms, or 15 ms in low-power mode (Table 1).
     pub wake_us: PerClockMode,
     /// Duration of a flash memory test, µs: 17 ms, or 90 ms in low-power mode (Table 1).
     pub flash_test_us: PerClockMode,

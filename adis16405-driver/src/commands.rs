@@ -96,7 +96,7 @@ impl Protocol<'_> {
     pub(crate) async fn configure(&mut self, config: Config) -> Result<(), ProtocolError> {
         self.state.configured = false;
         let mode = self.state.timing.clock_mode(config.smpl_prd());
-        // The longer stall of low-power mode is kept until the new sample period is known to be set.
+        // The driver keeps the longer stall of low-power mode until it knows that the new sample period is set.
         if mode == ClockMode::LowPower {
             self.state.mode = mode;
         }
@@ -108,10 +108,10 @@ impl Protocol<'_> {
             self.update_register(Register::GpioCtrl, DIO4_IS_OUTPUT, 0).await?;
         }
 
-        // SENS_AVG: range in the upper byte, first since it can change the filter (data sheet Rev. B, page 14), filter
-        // in the lower one.
+        // SENS_AVG: the upper byte (range) goes first, since it can change the lower one, the filter (data sheet Rev.
+        // B, page 14).
         let before = self.read(Register::SensAvg).await;
-        // Stored before the write: if it is interrupted, the part more likely has the new range than the old one.
+        // The configuration is stored before the write: after an interruption the part more likely has the new range.
         self.state.config = config;
         self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), WriteOrder::HighByteFirst).await?;
         self.state.configured = true;
@@ -159,10 +159,10 @@ impl Protocol<'_> {
         self.run_auto_null(PRECISION_AUTO_NULL, self.state.timing.precision_auto_null_us).await
     }
 
-    /// Auto-null; a negative offset of x becomes the host-side bias.
+    /// Runs an auto-null; a negative offset of x becomes the host-side bias.
     async fn run_auto_null(&mut self, command: u16, silence_us: u32) -> Result<GyroBias, ProtocolError> {
         self.write_low(Register::GlobCmd, command).await;
-        // Known from here on, should the procedure be interrupted: XGYRO_OFF may become negative.
+        // Set before the pause, in case the procedure is interrupted: XGYRO_OFF may become negative.
         self.state.host_bias_x = 0;
         self.state.x_sign_at_risk = true;
         self.pause(silence_us).await;

@@ -28,7 +28,7 @@ impl Config {
         Ok(Self { range, filter_taps_log2, sample_period, external_clock: false })
     }
 
-    /// The same configuration with another range.
+    /// Returns this configuration with another range.
     ///
     /// # Errors
     /// [`ConfigError::FilterTaps`] if the range needs more filter taps than are set.
@@ -37,7 +37,7 @@ impl Config {
         self.checked()
     }
 
-    /// The same configuration with another filter.
+    /// Returns this configuration with another filter.
     ///
     /// # Errors
     /// [`ConfigError::FilterTaps`] if M is above 6 or below the minimum of the range.
@@ -46,7 +46,7 @@ impl Config {
         self.checked()
     }
 
-    /// The same configuration with the internal clock and another sample period.
+    /// Returns this configuration with the internal clock and another sample period.
     #[must_use]
     pub const fn with_sample_period(mut self, sample_period: SamplePeriod) -> Self {
         self.sample_period = sample_period;
@@ -54,7 +54,7 @@ impl Config {
         self
     }
 
-    /// The same configuration with [`SampleClock::External`]. Without a clock at its pin the part takes no samples.
+    /// Returns this configuration with [`SampleClock::External`]. The part takes no samples without a clock at its pin.
     #[must_use]
     pub const fn with_external_clock(mut self) -> Self {
         self.external_clock = true;
@@ -118,7 +118,7 @@ impl Default for Config {
     }
 }
 
-/// How a [`Config`] is serialised; [`Config::new`] checks it again when it is deserialised.
+/// The serialised form of a [`Config`]; [`Config::new`] checks it when it is deserialised.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(rename = "Config")]

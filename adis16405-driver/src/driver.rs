@@ -1,4 +1,4 @@
-//! The driver's settings and table of methods, which `blocking` and `asynch` make.
+//! The driver's settings, and the table of methods that `blocking` and `asynch` expand.
 
 use core::marker::PhantomData;
 
@@ -78,7 +78,7 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         self
     }
 
-    /// Takes a part whose PROD_ID answers `prod_id` for an ADIS16405. A working part that answers 0x0003 is known.
+    /// Accepts `prod_id` as the PROD_ID of an ADIS16405. A working part that answers 0x0003 is known.
     #[must_use]
     pub fn with_prod_id(mut self, prod_id: u16) -> Self {
         self.state.prod_id = Some(prod_id);
@@ -91,13 +91,13 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
     }
 
     /// True if the part has its [configuration](Self::config) and no stimulus: [`init`](Self::init) or
-    /// [`configure`](Self::configure) succeeded, and nothing was left unfinished since. If false, [`init`](Self::init)
-    /// makes it true.
+    /// [`configure`](Self::configure) succeeded, and no procedure was left unfinished since. If false, call
+    /// [`init`](Self::init).
     pub fn is_ready(&self) -> bool {
         self.state.configured && !self.state.stimulated
     }
 
-    /// The number of bursts that [`read`](Self::read) has validated, and of their faults.
+    /// The number of bursts that [`read`](Self::read) has validated, and how many had each fault.
     pub fn fault_counters(&self) -> &FaultCounters {
         self.validator.counters()
     }
@@ -140,7 +140,7 @@ macro_rules! procedures {
         $make_methods! {
             $front
 
-            /// Reads which part is connected.
+            /// Reads PROD_ID and returns the connected part.
             ///
             /// # Errors
             /// [`Error::Product`] if PROD_ID is not that of a supported part.
@@ -187,7 +187,7 @@ macro_rules! procedures {
             /// [`Error::Verify`].
             plain fn set_sample_period(period: SamplePeriod) -> ();
 
-            /// Sets the rate nearest to `hz` and returns it, samples per second;
+            /// Sets the rate nearest to `hz`, samples per second, and returns it.
             /// [`set_sample_period`](Self::set_sample_period) needs no double precision.
             ///
             /// # Errors
@@ -206,7 +206,7 @@ macro_rules! procedures {
             /// [`Error::Config`] if M is above 6 or too small for the range, [`Error::Verify`].
             plain fn set_filter_taps_log2(filter_taps_log2: u8) -> ();
 
-            /// Reads a register in two frames, with undefined bits as sent.
+            /// Reads a register in two frames; undefined bits are returned as sent.
             ///
             /// # Errors
             /// [`Error::WriteOnly`] for GLOB_CMD (reading it would start a burst) and SLP_CNT.
@@ -432,7 +432,7 @@ macro_rules! procedures {
             plain fn sleep(sleep: Sleep) -> ();
 
             /// Wakes the part by a chip-select pulse ([`Timing::wake_pulse_ns`]), waits for [`Timing::wake_us`], and
-            /// identifies it. The pulse has one source, without a test; a reset wakes too.
+            /// identifies it. The pulse is known from one source and was not tested on a part; a reset wakes it too.
             ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer.

@@ -129,7 +129,7 @@ pub enum Error<E> {
     /// Unknown configuration, or a stimulus may be on: [`init`](crate::Adis16405::init) has to succeed first. Nothing
     /// was sent.
     NotReady,
-    /// A pin of the controller failed: that of the reset line, or of data ready.
+    /// The reset or data-ready pin of the controller failed.
     Pin,
     /// The part does not accept the configuration. Nothing was written.
     Config(ConfigError),
@@ -147,7 +147,7 @@ pub enum Error<E> {
 }
 
 impl Error<Infallible> {
-    /// The same error as the type of a driver whose bus can fail.
+    /// Converts the error to that of a driver whose bus can fail.
     pub(crate) fn with_bus_error<E>(self) -> Error<E> {
         match self {
             Error::Spi(never) => match never {},

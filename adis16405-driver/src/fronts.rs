@@ -1,6 +1,6 @@
-//! Both fronts of the driver: methods over a blocking and over an asynchronous bus, which differ in `async` and `.await`.
+//! Both fronts of the driver, blocking and asynchronous, which differ in `async` and `.await`.
 
-/// Makes the methods of a mode, and what carries out their requests. The caller has the traits of its kind of bus in scope.
+/// Makes the methods of a mode and the functions that carry out their requests. The mode's bus traits must be in scope.
 macro_rules! front {
     ($mode:ident, $new:ident, [$($async:tt)?], [$($await:tt)*]) => {
         use core::pin::pin;
@@ -155,7 +155,7 @@ macro_rules! front {
     };
 }
 
-/// Makes the methods that pass on to a procedure of the [`Protocol`](crate::protocol::Protocol).
+/// Makes the methods that call a procedure of the [`Protocol`](crate::protocol::Protocol).
 macro_rules! methods {
     ($front:tt $(
         $(#[$doc:meta])*
@@ -190,7 +190,7 @@ macro_rules! methods {
             let mut protocol = Protocol::new(&slot, &mut self.state);
             let result = run(&mut self.bus, &slot, protocol.$name($($passed)*))$($await)*;
             if self.state.stimulated {
-                // The first error is the one to report; the state tells whether this attempt has succeeded.
+                // The first error is reported; `stimulated` in the state tells whether this attempt succeeded.
                 let _ = self.stop_stimulus()$($await)*;
             }
             result

@@ -21,10 +21,10 @@
 //! # }
 //! ```
 //!
-//! # Where a call was interrupted
+//! # Interrupted calls
 //!
-//! A transaction under way may or may not have reached the part. The next call works: each read begins with its own
-//! request and pause. The part may be left with:
+//! A transaction under way may or may not have reached the part. The next call works, since each read begins with its
+//! own request and pause. An interrupted call can leave the part in these states:
 //!
 //! | interrupted | state of the part | remedy |
 //! |---|---|---|
@@ -44,21 +44,21 @@
 //! # Equal samples
 //!
 //! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor, a full period apart; 37
-//! differed in another word. A sample that was read twice is distinguished from one that is equal by chance by its
-//! new-data flags, or, in a recording without them, by its time.
+//! differed in another word. The new-data flags distinguish a sample that was read twice from one that is equal by
+//! chance. In a recording without flags, the times of the samples do.
 //!
 //! # Sources
 //!
-//! Facts are those of the data sheet ADIS16400/ADIS16405 Rev. B, with page or table. It says nothing of the reset pulse
-//! and of the least time that chip select is high ([`Timing`]), nor of the rate at which supply, magnetometers,
-//! temperature and auxiliary input are refreshed ([`Faults::NO_NEW_DATA`]). The erratum of the x rate ([`GyroBias`]) is
-//! from users of the part.
+//! Facts are those of the data sheet ADIS16400/ADIS16405 Rev. B, with page or table. It does not specify the reset
+//! pulse, the least time that chip select is high ([`Timing`]), or the update rate of supply, magnetometers,
+//! temperature and auxiliary input ([`Faults::NO_NEW_DATA`]). The erratum of the x rate ([`GyroBias`]) was reported by
+//! users of the part.
 //!
 //! # Structure
 //!
 //! Functions are `async` procedures without I/O that request frames and pauses. The blocking and the asynchronous
-//! driver carry them out, with the same methods from one table. A burst read needs no procedure, and so no time beyond
-//! the bus and the stall.
+//! driver carry them out, with the same methods from one table. A burst read needs no procedure: it takes no time
+//! beyond the bus and the stall.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![no_std]
 #![forbid(unsafe_code)]

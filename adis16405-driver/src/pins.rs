@@ -105,17 +105,17 @@ pub struct Gpio {
 pub struct DacLevel(u16);
 
 impl DacLevel {
-    /// From the value of AUX_DAC; `None` above 4095.
+    /// The level with this value of AUX_DAC; `None` above 4095.
     pub const fn from_counts(counts: u16) -> Option<Self> {
         if counts <= 0x0FFF { Some(Self(counts)) } else { None }
     }
 
-    /// Nearest to a voltage in mV, at 0.8059 mV a count (data sheet Rev. B, Table 20); `None` above 3300 mV.
+    /// The level nearest to a voltage in mV, at 0.8059 mV a count (data sheet Rev. B, Table 20); `None` above 3300 mV.
     pub const fn from_millivolts(millivolts: u16) -> Option<Self> {
         if millivolts > 3300 {
             return None;
         }
-        // 3300 mV are 4094.8 counts, so that the result fits 12 bits.
+        // 3300 mV are 4094.8 counts, so the result fits 12 bits.
         Some(Self(((millivolts as u32 * 10_000 + 4_029) / 8_059) as u16))
     }
 

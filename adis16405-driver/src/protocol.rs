@@ -106,7 +106,7 @@ pub(crate) struct DriverState {
     pub(crate) timing: Timing,
     /// True if changed registers are read back and compared.
     pub(crate) verify: bool,
-    /// The power mode of the part. While it is unknown or changes, low-power mode, which has the longer stall.
+    /// The power mode of the part: low-power mode, with the longer stall, while it is unknown or changes.
     pub(crate) mode: ClockMode,
     /// Bias correction of gyro x that the driver adds instead of XGYRO_OFF, in counts of 0.0125 °/s.
     pub(crate) host_bias_x: i16,
@@ -143,7 +143,7 @@ impl DriverState {
         self.mode = ClockMode::LowPower;
     }
 
-    /// Low-power mode unless configured: by flash, or from before a restart.
+    /// Assumes low-power mode unless configured: flash or an earlier start may have selected it.
     pub(crate) const fn assume_low_power_until_read(&mut self) {
         if !self.configured {
             self.mode = ClockMode::LowPower;
@@ -156,7 +156,7 @@ impl DriverState {
         FramePauses::new(timing.stall_select, timing.frame_stall_ns(self.mode), timing.select_high_ns)
     }
 
-    /// The pauses after a burst in the present power mode. A burst takes longer than the read rate asks for.
+    /// The pauses after a burst in the present power mode. A burst takes longer than the least time between frames.
     pub(crate) fn burst_pauses(&self) -> FramePauses {
         let timing = &self.timing;
         FramePauses::new(timing.stall_select, timing.stall_ns.get(self.mode), timing.select_high_ns)
@@ -260,7 +260,7 @@ impl<'a> Protocol<'a> {
         self.update_from(register, before, mask, value, WriteOrder::LowByteFirst).await
     }
 
-    /// As [`update_register`](Self::update_register), for a register that was just read as `before`.
+    /// Sets the bits of `mask` in a register that was just read as `before`.
     pub(crate) async fn update_from(
         &self,
         register: Register,
@@ -275,7 +275,7 @@ impl<'a> Protocol<'a> {
         if different & 0xFF00 != 0 && order == WriteOrder::HighByteFirst {
             self.write_high(register, after).await;
         }
-        // After the upper byte the part may have changed the lower one: see `configure`.
+        // A written upper byte may have changed the lower one: see `configure`.
         let may_have_changed = order == WriteOrder::HighByteFirst && different & 0xFF00 != 0;
         if different & 0x00FF != 0 || may_have_changed {
             self.write_low(register, after).await;
@@ -297,8 +297,7 @@ impl<'a> Protocol<'a> {
         self.update_register(register, u16::MAX, value).await
     }
 
-    /// Polls until the bits of `mask` are clear; true if they were set in any poll, [`Error::Deadline`] after
-    /// `most_us`.
+    /// Polls until the bits of `mask` are clear. True if a poll saw them set; [`Error::Deadline`] after `most_us`.
     pub(crate) async fn wait_until_clear(
         &self,
         register: Register,

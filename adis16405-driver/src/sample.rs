@@ -21,26 +21,26 @@ pub struct ImuSample {
 const BIAS_UDPS: i32 = 12_500;
 
 impl ImuSample {
-    /// From counts that were taken in `range`, without a host-side bias correction.
+    /// A sample of counts taken in `range`, without a host-side bias correction.
     pub const fn new(counts: Counts, range: GyroRange) -> Self {
         Self { counts, range, host_bias_x: 0, warnings: Faults::empty() }
     }
 
-    /// Sets the correction of x, counts of 0.0125 °/s: see [`GyroBias`](crate::GyroBias).
+    /// Sets the correction of x in counts of 0.0125 °/s: see [`GyroBias`](crate::GyroBias).
     #[must_use]
     pub const fn with_host_bias_x(mut self, host_bias_x: i16) -> Self {
         self.host_bias_x = host_bias_x;
         self
     }
 
-    /// Sets the faults that the burst shows and that did not refuse it.
+    /// Sets the faults that the burst shows and for which it was not refused.
     #[must_use]
     pub const fn with_warnings(mut self, warnings: Faults) -> Self {
         self.warnings = warnings;
         self
     }
 
-    /// Faults that did not refuse the burst, [`Faults::WARNINGS`] by default
+    /// Faults for which the burst was not refused, [`Faults::WARNINGS`] by default
     /// ([`with_refused_faults`](crate::Adis16405::with_refused_faults)); none without validation.
     pub const fn warnings(&self) -> Faults {
         self.warnings

@@ -68,7 +68,7 @@ const SETTINGS: u16 = 0x03C7;
 const STIMULI: u16 = 0x0300;
 /// Number of samples whose mean is compared with and without a stimulus.
 const AVERAGED: i32 = 8;
-/// Sample periods beside [`Timing::self_test_us`](crate::Timing::self_test_us), at any rate.
+/// Sample periods that the test may take beyond [`Timing::self_test_us`](crate::Timing::self_test_us), at any rate.
 const SAMPLES_IN_TEST: u32 = 20;
 
 const INERTIAL: [Register; 6] = [
@@ -95,7 +95,7 @@ impl Protocol<'_> {
 
     /// Runs the test of an MSC_CTRL bit; returns DIAG_STAT before, whether the test ran, and DIAG_STAT after.
     async fn run_test(&mut self, bit: u16, usual_us: u32) -> Result<(Diagnosis, bool, Diagnosis), ProtocolError> {
-        // A part that is absent may read as zeros, which would look like a test that has ended.
+        // An absent part may read as zeros, which would look like a finished test.
         self.identity().await?;
         let before = self.diagnosis().await?;
         let control = self.read(Register::MscCtrl).await;

@@ -16,14 +16,14 @@ pub enum SelectDuringStall {
     Low,
 }
 
-/// Longest delay that is asked for at once, µs: some HALs compute its cycles in 32 bits, which 25 s at 168 MHz overflow.
+/// Longest single delay, µs. Some HALs compute its cycles in 32 bits, which 25 s at 168 MHz overflow.
 pub(crate) const LONGEST_DELAY_US: u32 = 100_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FramePauses {
-    /// With chip select low, ns.
+    /// Pause with chip select low, ns.
     pub(crate) low_ns: u32,
-    /// With chip select high, ns.
+    /// Pause with chip select high, ns.
     pub(crate) high_ns: u32,
 }
 
@@ -36,7 +36,8 @@ impl FramePauses {
         }
     }
 
-    /// Without the last one, the pause with chip select low, if it is 0: devices without a delay cannot carry it out.
+    /// Drops the last operation, the pause with chip select low, if it is 0: devices without a delay cannot carry it
+    /// out.
     pub(crate) fn operations<'a, 'b>(&self, operations: &'a mut [Operation<'b, u8>]) -> &'a mut [Operation<'b, u8>] {
         if self.low_ns > 0 {
             return operations;

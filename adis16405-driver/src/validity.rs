@@ -24,7 +24,7 @@ bitflags::bitflags! {
         const REPEATED = 1 << 5;
         /// The words are those of a valid burst, shifted by 1 to 15 bits: an SCK edge was lost or counted twice.
         const SHIFTED = 1 << 6;
-        /// A gyro beyond ±7000 counts, where full scale is ±6000: a damaged word or a lost sign bit.
+        /// A gyro count is beyond ±7000, where full scale is ±6000: a damaged word or a lost sign bit.
         const IMPOSSIBLE_RATE = 1 << 7;
         /// All twelve words equal for [`BurstValidator::FROZEN_AFTER`] bursts, four times the longest filter.
         const FROZEN = 1 << 8;
@@ -40,14 +40,14 @@ bitflags::bitflags! {
 }
 
 impl Faults {
-    /// Largest magnitude of a gyro count that is no [`IMPOSSIBLE_RATE`](Self::IMPOSSIBLE_RATE); full scale is ±6000.
+    /// Largest magnitude of a gyro count without [`IMPOSSIBLE_RATE`](Self::IMPOSSIBLE_RATE); full scale is ±6000.
     pub const LARGEST_RATE: i16 = 7000;
 
-    /// Faults with which samples are used: chance repeats (leaving them out would bias the noise), supply outside its
-    /// window, flags in DIAG_STAT.
+    /// Faults for which a sample is not refused: supply outside its window, flags in DIAG_STAT, and chance repeats,
+    /// whose refusal would bias the noise.
     pub const WARNINGS: Faults = Faults::REPEATED.union(Faults::SUPPLY).union(Faults::ERROR_ALARM);
 
-    /// Faults of single inertial words, which refuse the channel of the word alone.
+    /// Faults of single inertial words; each refuses only the channel of its word.
     pub const OF_CHANNELS: Faults = Faults::NO_NEW_DATA.union(Faults::IMPOSSIBLE_RATE).union(Faults::X_SIGN);
 
     /// Default refusal of [`BurstValidator::with_refused_faults`]: all but the [`WARNINGS`](Self::WARNINGS).
@@ -69,8 +69,8 @@ impl Faults {
         (Faults::SUPPLY, "supply"),
     ];
 
-    /// The first fault's name in the order of [`CAUSES`](Self::CAUSES): zeros are `stuck_low`, though they also lack
-    /// data and supply.
+    /// The name of the first fault in the order of [`CAUSES`](Self::CAUSES): zeros are `stuck_low`, although their data
+    /// and supply are wrong too.
     pub fn cause(self) -> Option<&'static str> {
         self.causes().next()
     }
@@ -128,7 +128,7 @@ impl Burst {
         (-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&self.words[gyro as usize].counts(gyro))
     }
 
-    /// Channels refused by `faults`: those of a word's fault, else all.
+    /// Channels refused by `faults`: that of the word for a word's fault, else all.
     fn refused_channels(&self, faults: Faults) -> ChannelMask {
         if faults.is_empty() {
             return ChannelMask::EMPTY;
@@ -156,7 +156,8 @@ fn supply_in_range(word: OutputWord) -> bool {
     SUPPLY_COUNTS.contains(&word.counts(Channel::Supply))
 }
 
-/// Searches a shift that sets the inertial new-data flags, makes eleven error/alarm flags equal, and the supply valid.
+/// True if a shift exists that sets the inertial new-data flags, makes eleven error/alarm flags equal, and the supply
+/// valid.
 fn is_shifted(words: &[OutputWord; 12]) -> bool {
     let new = |words: &[OutputWord]| words.iter().all(|word| word.new_data());
     (1..16).any(|bits| {
@@ -168,13 +169,13 @@ fn is_shifted(words: &[OutputWord; 12]) -> bool {
     })
 }
 
-/// True for an x rate that may be a negative one without its sign bit, 2¹³.
+/// True if x may be a negative rate without its sign bit, 2¹³.
 fn may_have_lost_its_sign(x: i16) -> bool {
     x >= (1 << 13) - Faults::LARGEST_RATE
 }
 
-/// Faults of a burst, and the channels that they refuse: the one rule for [`read`](crate::Adis16405::read), devices and
-/// recordings.
+/// Faults of a burst, and the channels that they refuse. [`read`](crate::Adis16405::read), devices and recordings share
+/// this rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -182,8 +183,8 @@ fn may_have_lost_its_sign(x: i16) -> bool {
 pub struct Validity {
     /// The faults found.
     pub faults: Faults,
-    /// Not to be used: the channels of single words' faults ([`Faults::OF_CHANNELS`]), all for others that are no
-    /// [warning](Faults::WARNINGS).
+    /// Channels not to be used: those of single words' faults ([`Faults::OF_CHANNELS`]), or all if any other fault is
+    /// not a [warning](Faults::WARNINGS).
     pub refused: ChannelMask,
 }
 
@@ -277,8 +278,8 @@ impl BurstValidator {
         self
     }
 
-    /// Sets the refusing faults, [`Faults::REFUSED`] by default; with `Faults::SUPPLY` a sample at 4.7 V is refused
-    /// too. Others are only counted.
+    /// Sets the faults that refuse, [`Faults::REFUSED`] by default; `Faults::SUPPLY` refuses a sample at 4.7 V too.
+    /// Others are only counted.
     #[must_use]
     pub const fn with_refused_faults(mut self, faults: Faults) -> Self {
         self.refused_faults = faults;

@@ -8,6 +8,9 @@ use core::ops::Sub;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
 ///
+/// With the running sums `x` of the samples, the variance at `n` is the mean of `(x[k+2n] − 2x[k+n] + x[k])²/(2n²)` over
+/// `k` in steps of `n/OVERLAP`, or of 1 for `n < OVERLAP` (overlapping Allan variance; W. Riley, NIST SP 1065).
+///
 /// ```
 /// let mut estimator = allan_core::Cascade::<20, 8>::new();
 /// estimator.push(-12); // a sample, in counts
@@ -143,7 +146,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Adds the next sample, in counts.
+    /// Adds the next sample, in counts. Every `i32` is allowed; see the range of [`Cascade`].
     ///
     /// The first 2048 samples, and those after a gap until the shortest octaves have left it behind, take more time.
     ///
@@ -158,7 +161,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
     pub fn push(&mut self, sample: i32) {
-        // Also true once in 2³² samples without need, which changes nothing.
+        // The subtraction wraps, so this is true once in 2³² samples without need: the slow path gives the same sums.
         if (self.elapsed as u32).wrapping_sub(self.settling) < Self::WARM as u32 - 1 {
             return self.push_unsettled(sample);
         }
@@ -185,7 +188,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(Self::SHORT, middle);
     }
 
-    /// [`push`](Self::push) where a gap lies before the sample or an octave must leave out differences.
+    /// [`push`](Self::push) for a sample after a gap, or while an octave must leave out differences.
     #[inline(never)]
     fn push_unsettled(&mut self, sample: i32) {
         if self.pending > 0 {
@@ -205,14 +208,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(0, middle);
     }
 
-    /// Passes `middle`, the sum that left the line above `level`, down all lines of which the newest sample ends a stride.
+    /// Passes `middle`, the sum that left the line above `level`, down all lines whose stride the newest sample ends.
     #[inline(never)]
     fn advance(&mut self, level: usize, mut middle: i64) {
         let (elapsed, newest) = (self.elapsed, self.sum);
         let due = (elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
-        // As a slice: chained iterators would be kept on the stack, and the code for an index's panic linked.
+        // A slice: chained iterators would be kept on the stack, and an index would link the code of its panic.
         let lines = self.octaves.get_mut(Self::FINE + level..Self::FINE + due).unwrap_or_default();
-        // Shifts of 64 bits by a variable take ten instructions; a slot depends on bits below the 31st.
+        // 32 bits are enough for a slot, and a 64-bit shift by a variable takes ten instructions.
         let (mut step, mut reach) = ((elapsed >> level) as u32, 2 << (Self::FINE + level));
         for (at, octave) in (Self::FINE + level..).zip(lines) {
             let oldest = octave.exchange(step.into(), middle);
@@ -224,7 +227,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     }
 }
 
-// The page of the documentation has the methods in this order: `new`, `push`, `gap`, `curve`, `snapshot`, the others.
+// rustdoc lists the methods in this order: `new`, `push`, `gap`, `curve`, `snapshot`, the others.
 mod gap;
 
 pub(crate) mod checkpoint;
@@ -287,7 +290,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         (self.ended, self.missing) = (0, 0);
     }
 
-    /// Samples taken.
+    /// Number of samples taken, without missing ones.
     #[must_use]
     pub const fn len(&self) -> u64 {
         self.ended.saturating_add(self.elapsed - self.absent)
@@ -299,13 +302,13 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.len() == 0
     }
 
-    /// Samples reported missing through [`gap`](Self::gap).
+    /// Number of samples reported missing through [`gap`](Self::gap).
     #[must_use]
     pub const fn missing(&self) -> u64 {
         self.missing.saturating_add(self.absent).saturating_add(self.pending)
     }
 
-    /// Missing samples that the curve replaces: those in gaps that its longer octaves bridge.
+    /// Number of missing samples that the curve replaces: those in gaps that its longer octaves bridge.
     #[must_use]
     pub fn replaced(&self) -> u64 {
         self.octaves.iter().map(|octave| u64::from(octave.interpolation.replaced())).sum()
@@ -405,7 +408,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         (self.elapsed, self.pending)
     }
 
-    /// Slot of the sum of a step of a level in its line.
+    /// The slot of a step's sum in the line of its level.
     #[inline]
     const fn slot(step: u64) -> usize {
         step as usize & (OVERLAP - 1)
@@ -426,10 +429,8 @@ pub(crate) fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
 
 /// [`second_difference`] in words of any width `w`, which hold the sums modulo `2ʷ`.
 ///
-/// Congruences may be subtracted, so the result is congruent modulo `2ʷ` to the true difference `d = b − a` of the sums
-/// of the newest `n` samples and of the `n` before. Both are in `−2ʷ⁻¹ ..= 2ʷ⁻¹ − 1` if `|d| < 2ʷ⁻¹`, where congruent
-/// numbers are equal. Samples of `w/2` bits have `|d| ≤ n·(2^(w/2) − 1)`, below `2ʷ⁻¹` for `n ≤ 2^(w/2−1)`: for `n ≤
-/// 2³¹` in 64 bits, and the longest octave has `2³⁰`.
+/// The result is exact while the true difference is below `2ʷ⁻¹`. For samples of `w/2` bits it is, up to `n =
+/// 2^(w/2−1)`: up to `n = 2³¹` in 64 bits, and the longest octave has `2³⁰`.
 #[inline]
 fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, oldest: W) -> W {
     newest - middle - (middle - oldest)
@@ -439,7 +440,7 @@ fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, ol
 mod tests {
     use super::*;
 
-    /// Every sum of samples of 4 bits from every start of a running sum of 8 bits.
+    /// Tries all sums of 4-bit samples from every start of an 8-bit running sum.
     #[test]
     fn second_differences_of_wrapped_sums_are_exact_up_to_the_longest_averaging_time() {
         let word = |sum: i32| Wrapping(sum as i8);

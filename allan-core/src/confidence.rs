@@ -12,7 +12,8 @@ pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 /// Equivalent degrees of freedom of the mean of `count` squared second differences at averaging factor `n`, taken every
 /// `n/overlap` samples.
 ///
-/// `overlap` is 1 to 16, and the result at least 1 for a count of at least 1.
+/// `n` is in samples, and `overlap` is 1 to 16. With the correlation matrix `R` of the `M = count` differences, the
+/// result is `M²/tr R²` (Greenhall and Riley, 2003): at least 1 for a count of at least 1.
 #[must_use]
 pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f64 {
     ChiSquareApproximation::new(Difference::Second, n, count, overlap, fractions).edf
@@ -21,7 +22,8 @@ pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f6
 /// Correlation coefficient of the Allan variances measured at two octaves that are `lag` octaves apart, for near-full
 /// overlap; `a` and `b` are the noise mixtures at the two octaves.
 ///
-/// Exact for lags of up to three octaves of pure noises in an infinite record; beyond, it decays geometrically.
+/// The result is between 0 and 1. It is exact for lags of up to three octaves of pure noises in an infinite record;
+/// beyond, it decays geometrically.
 #[must_use]
 pub fn octave_correlation(lag: usize, a: VarianceFractions, b: VarianceFractions) -> f64 {
     let (a, b): ([f64; 3], [f64; 3]) = (roots(a), roots(b));
@@ -96,8 +98,8 @@ pub(crate) struct ChiSquareApproximation {
 }
 
 impl ChiSquareApproximation {
-    /// For `count` differences at averaging factor `n`, one every `n/overlap ≥ n/16` samples: with their correlation
-    /// matrix `R`, `edf = M²/tr R²` and `1 + excess_skewness = tr R³·M/(tr R²)²`.
+    /// The distribution for `count` differences at averaging factor `n`, one every `n/overlap ≥ n/16` samples. With
+    /// their correlation matrix `R`, `edf = M²/tr R²` and `1 + excess_skewness = tr R³·M/(tr R²)²`.
     pub(crate) fn new(difference: Difference, n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> Self {
         let reach =
             (difference.reach(fractions) * u64::from(overlap)).min(count.saturating_sub(1)).min(LAGS as u64 - 1);
@@ -118,8 +120,7 @@ impl ChiSquareApproximation {
         Self { edf: m / square, excess_skewness: (cube / (square * square) - 1.0).max(0.0) }
     }
 
-    /// 95 % bounds of the true variance, where `estimate` is left of a measured variance after `subtracted` was taken
-    /// off it.
+    /// 95 % bounds of the true variance if `estimate` is a measured variance less `subtracted`.
     ///
     /// They are the bounds of the measured variance, less `subtracted`; the lower one ends at 0. The χ² quantiles are
     /// multiplied by the Cornish–Fisher term `exp(⅔(z² − 1)·excess_skewness/edf · e^(±c/√edf))` with `c` fitted to
@@ -174,7 +175,7 @@ pub(crate) fn chi_square_quantile(p: f64, dof: f64) -> f64 {
         return guess;
     }
     let shape = dof / 2.0;
-    // With a cube near or below 0, P(a, x) ≈ x^a / Γ(a+1) gives a positive start.
+    // If the cube is near or below 0, `P(a, x) ≈ x^a / Γ(a+1)` gives a positive start.
     let small = 2.0 * exp((ln(p) + ln_gamma(shape + 1.0)) / shape);
     let mut x = if cube > 0.1 { guess } else { small };
     for _ in 0..60 {
@@ -243,7 +244,8 @@ mod tests {
     use super::*;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-    /// Noise, overlap, differences, edf, and exact quantiles (2.5 %, 97.5 %) of the mean square (Imhof's integral).
+    /// The cases: noise, overlap, differences, edf, and exact quantiles (2.5 %, 97.5 %) of the mean square (Imhof's
+    /// integral).
     const EXACT: &[(VarianceFractions, u32, u64, f64, f64, f64)] = &[
         (VarianceFractions::WHITE, 1, 7, 4.900, 0.1879, 2.6106),
         (VarianceFractions::WHITE, 4, 13, 5.302, 0.2355, 2.5657),
@@ -273,7 +275,7 @@ mod tests {
             // The tolerance allows for flicker correlations beyond four averaging times, which are left out.
             assert!((law.edf / edf - 1.0).abs() < 5e-3, "{fractions:?}, {overlap}, {count}: edf {}", law.edf);
             let (lower, upper) = law.bounds(1.0, 0.0);
-            // Within 0.3 percentage points of 2.5 % at each end.
+            // The probability beyond each bound is within 0.3 percentage points of 2.5 %.
             assert!((upper * low - 1.0).abs() < 0.06, "{fractions:?}, {overlap}, {count}: {}", 1.0 / upper);
             assert!((lower * high - 1.0).abs() < 0.01, "{fractions:?}, {overlap}, {count}: {}", 1.0 / lower);
         }
@@ -288,7 +290,7 @@ mod tests {
                 for estimate in [9.0, 5.0, 1.0, 0.1] {
                     let (low, high) = law.bounds(estimate, 10.0 - estimate);
                     assert!((0.0..estimate).contains(&low) && high > estimate, "{count}, {estimate}: {low} to {high}");
-                    // The width is that of the measured variance, less what would be negative.
+                    // The bounds are those of the measured variance less the subtracted one, and not below 0.
                     assert!((high - (measured_high - 10.0 + estimate)).abs() < 1e-12, "{count}, {estimate}: {high}");
                     assert!(low == 0.0 || (low - (measured_low - 10.0 + estimate)).abs() < 1e-12, "{count}: {low}");
                 }

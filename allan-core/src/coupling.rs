@@ -14,7 +14,7 @@ pub struct Covariance {
     pub n: u64,
     /// Half the mean product of the two channels' differences of averages, in the product of their units.
     pub covariance: f64,
-    /// Number of products that it is the mean of.
+    /// Number of products averaged.
     pub count: u64,
 }
 
@@ -43,7 +43,7 @@ pub struct Covariance {
 /// estimators must have started together and go through the same time: otherwise nothing is added and
 /// [`out_of_step`](Self::out_of_step) counts the sample.
 ///
-/// Samples that are missing in both channels raise shared noise by up to 1.5 times their share.
+/// Samples missing in both channels raise the covariance of shared noise by up to 1.5 times their fraction.
 ///
 /// # Range
 /// Exact for 2⁴⁰ samples within ±2²³. An octave whose sum overflows 128 bits has no covariance from then on.
@@ -108,7 +108,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         self.out_of_step = self.out_of_step.saturating_add(later.out_of_step);
     }
 
-    /// The exact sum of products of second differences of sums of `2^octave` samples, and their number.
+    /// The exact sum of products of second differences of sums of `2^octave` samples, in the product of the channels' counts,
+    /// and their number.
     ///
     /// `None` beyond the last octave and where the sum has overflowed.
     #[must_use]
@@ -117,7 +118,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         (sum != OVERFLOWED).then(|| (sum, self.counts[octave]))
     }
 
-    /// The covariance of every octave that has at least one product, shortest first.
+    /// The covariance, in the product of the channels' counts, of every octave that has at least one product, shortest
+    /// first.
     ///
     /// # Cost
     /// | `Coupling::points` | Cortex-M4F | Cortex-M0+ |
@@ -138,7 +140,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         points.collect()
     }
 
-    /// Samples left out because the two estimators were not at the same time or one has a gap before its next sample.
+    /// Number of samples left out because the two estimators were not at the same time or one has a gap before its next
+    /// sample.
     #[must_use]
     pub const fn out_of_step(&self) -> u64 {
         self.out_of_step

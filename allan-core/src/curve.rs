@@ -116,6 +116,7 @@ pub struct CurveView<'a> {
 
 impl<'a> CurveView<'a> {
     /// The curve with these points, shortest averaging time first, of `samples` samples every `sample_period` seconds.
+    /// The arguments are not checked.
     #[must_use]
     pub const fn new(sample_period: f64, samples: u64, points: &'a [AllanPoint]) -> Self {
         Self { sample_period, samples, points }
@@ -146,7 +147,7 @@ impl<'a, const OCTAVES: usize> From<&'a Curve<OCTAVES>> for CurveView<'a> {
     }
 }
 
-/// Why a table is no [`Curve`]. Rows are counted from 0.
+/// The reason for which a table is not a [`Curve`]. Rows are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
@@ -228,8 +229,9 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// The curve of a table that was computed elsewhere, with the noise type and the confidence that this crate gives
     /// it.
     ///
-    /// A row is an averaging factor in samples and the Allan *variance*; `overlap` is the number of differences per
-    /// averaging time, 1 to 16. The number of differences is that of `samples` samples without gaps.
+    /// A row is an averaging factor in samples and the Allan *variance*, in the square of the unit. `sample_period` is in
+    /// seconds, and `overlap` is the number of differences per averaging time, 1 to 16. The number of differences is that
+    /// of `samples` samples without gaps.
     ///
     /// ```
     /// use allan_core::{Curve, NoiseTerm, fit::fit};
@@ -242,7 +244,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// ```
     ///
     /// # Errors
-    /// The first row that a curve cannot have.
+    /// A [`TableError`] for the first argument or row that a curve cannot have.
     ///
     /// # Cost
     /// | `Curve::from_points` | Cortex-M4F | Cortex-M0+ |
@@ -348,14 +350,14 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.retain(keep);
     }
 
-    /// The same curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
+    /// Returns the curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
         self.scale(lsb);
         self
     }
 
-    /// As [`scaled`](Self::scaled), in place.
+    /// Converts the curve to another unit in place: see [`scaled`](Self::scaled).
     pub fn scale(&mut self, lsb: f64) {
         let square = lsb * lsb;
         for point in &mut self.points {
@@ -377,8 +379,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Subtracts `variance` of its averaging factor from every point, up to nine tenths of the measured variance in
-    /// all.
+    /// Subtracts `variance(n)`, in the square of the unit, from the point at averaging factor `n`, for every point. At
+    /// most nine tenths of a measured variance are subtracted in all.
     #[cfg(feature = "host")]
     pub fn subtract_interpolation(&mut self, variance: impl Fn(u64) -> f64) {
         for point in &mut self.points {
@@ -403,7 +405,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.extend(other.points.iter().copied());
     }
 
-    /// The same curve with the confidence of the variance fractions that `fractions` returns for each point.
+    /// Returns the curve with degrees of freedom and bounds from the variance fractions that `fractions` returns for
+    /// each point.
     #[must_use]
     pub fn with_confidence(mut self, mut fractions: impl FnMut(&AllanPoint) -> VarianceFractions) -> Self {
         self.set_confidence(&mut fractions);

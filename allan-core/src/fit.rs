@@ -27,8 +27,9 @@ const EDF_ROUNDS: usize = 4;
 /// Fits the coefficients of `kinds` to all points of a curve; shape parameters stay as given.
 ///
 /// The first [`MAX_TERMS`] of `kinds` are used, each of which must occur once. Coefficients are in the unit of the
-/// curve (see [`NoiseTerm::unit`]), with 95 % bounds. A curve without points, or of a channel that never changed, gives
-/// coefficients of 0.
+/// curve (see [`NoiseTerm::unit`]), with 95 % bounds. They maximise the gamma likelihood of the [module](self). A curve
+/// without points, or of a channel that never changed, gives coefficients of 0. Of a curve with more than
+/// [`MAX_POINTS`] points only the octaves are used.
 ///
 /// # Cost
 /// | `fit::fit` | Cortex-M4F | Cortex-M0+ |
@@ -69,7 +70,8 @@ fn fit_of<T: TermSet>(curve: CurveView, kinds: &[NoiseTerm]) -> Model {
     model
 }
 
-/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters, starting from the given ones.
+/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters in s and Hz ([`NoiseTerm::shape`]),
+/// starting from the given ones.
 ///
 /// # Cost
 /// | `fit::fit_shapes` | Cortex-M4F | Cortex-M0+ |
@@ -92,13 +94,14 @@ pub(crate) fn set_bounds(curve: CurveView, model: &mut Model) {
     bounds::set::<AllTerms>(curve, model);
 }
 
-/// As [`set_bounds`], with the shapes that are not `free` known exactly.
+/// Sets the bounds of `model`, which was fitted to `curve`; shapes that are not `free` count as exactly known.
 #[cfg(feature = "host")]
 pub(crate) fn set_free_bounds(curve: CurveView, model: &mut Model, free: FreeShapes) {
     bounds::set_free::<AllTerms>(curve, model, free);
 }
 
-/// Tests whether `model`, which was fitted to `curve`, describes it within its uncertainty.
+/// Tests whether `model`, which was fitted to `curve`, describes it within its uncertainty: the [`Goodness`] of the
+/// fit.
 ///
 /// # Cost
 /// | `fit::goodness` | Cortex-M4F | Cortex-M0+ |
@@ -153,14 +156,15 @@ pub(crate) fn estimate<T: TermSet>(
     model.set(curve.sample_period(), problem.terms());
 }
 
-/// How well a model describes the curve that it was fitted to.
+/// The goodness of a fit: how well a model describes the curve that it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Goodness {
-    /// `Σ edf·(v/m − 1 − ln(v/m))` over all points.
+    /// `Σ edf·(v/m − 1 − ln(v/m))` over all points, 0 or more.
     pub deviance: f64,
-    /// Probability of a deviance at least this large if the model is correct.
+    /// Probability, 0 to 1, of a deviance at least this large if the model is correct. It is computed from a scaled χ²
+    /// distribution (F. Satterthwaite, Biometrics 2, 1946).
     pub p_value: f64,
 }
 
@@ -214,7 +218,7 @@ pub(crate) struct Baseline<'a> {
     tried: Problem<AllTerms>,
 }
 
-/// By how much another set of terms fits better.
+/// The improvement of the fit by another set of terms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Improvement {
     fall: f32,
@@ -235,7 +239,7 @@ impl Improvement {
 }
 
 impl<'a> Baseline<'a> {
-    /// To be filled in place: too large to be moved over a small stack.
+    /// An empty baseline, to be filled in place: it is too large to be moved over a small stack.
     #[inline(always)]
     pub(crate) const fn empty(curve: CurveView<'a>) -> Self {
         Self {
@@ -267,7 +271,7 @@ impl<'a> Baseline<'a> {
         self.deviance - self.tried.minimise(&self.points)
     }
 
-    /// [`fall`](Self::fall) where the Allan variances of some terms at some averaging factors are known.
+    /// [`fall`](Self::fall) with the `known` Allan variances of some terms at some averaging factors.
     #[cfg(feature = "host")]
     pub(crate) fn fall_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f32 {
         self.tried.set_terms_with(&self.points, kinds, known);

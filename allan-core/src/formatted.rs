@@ -1,4 +1,4 @@
-//! Compact `defmt::Format` of the estimators: what they have seen instead of their sums.
+//! Compact `defmt::Format` of the estimators: numbers of samples and differences instead of all sums.
 
 use crate::{Cascade, Coupling, FractionalOctaves, Hadamard, Snapshot};
 use defmt::{Format, Formatter, write};

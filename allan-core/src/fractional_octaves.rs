@@ -27,7 +27,7 @@ const FACTORS: [u64; 3] = [5, 6, 7];
 /// ```
 ///
 /// # Range
-/// As [`Cascade`].
+/// The range is that of [`Cascade`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FractionalOctaves<const OCTAVES: usize, const OVERLAP: usize> {
     moments: [[Moments; FACTORS.len()]; OCTAVES],
@@ -62,7 +62,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
         let newest = cascade.newest_sum();
         for doubling in 0..OCTAVES.saturating_sub(3) {
             if !cascade.ends_stride(level::<OVERLAP>(doubling)) {
-                return; // nor of longer averaging times
+                return; // longer averaging times end no stride either
             }
             // A gap is bridged where the octave below bridges it.
             let span = cascade.span(doubling + 2) >> doubling;
@@ -97,10 +97,10 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
         Some((self.moments.get(doubling)?[k].squares.get(), self.counts.get(doubling)?[k]))
     }
 
-    /// The curve of `cascade`, which must be the observed one, with these points between its octaves.
+    /// The curve, in counts², of `cascade`, which must be the observed one, with these points between its octaves.
     ///
-    /// `sample_period` in seconds; `POINTS` must be `4·OCTAVES` or more. Neighbouring points are strongly correlated:
-    /// the bounds of a [`fit`](crate::fit::fit) hold for curves of octaves only.
+    /// `sample_period` is in seconds; `POINTS` must be `4·OCTAVES` or more. Neighbouring points are strongly
+    /// correlated: the bounds of a [`fit`](crate::fit::fit) hold for curves of octaves only.
     ///
     /// # Cost
     /// | `FractionalOctaves::curve` | Cortex-M4F | Cortex-M0+ |

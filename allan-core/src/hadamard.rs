@@ -1,4 +1,5 @@
-//! Hadamard variance: by third differences of the running sum, on which a linear drift of the rate has no effect.
+//! Hadamard variance (W. Riley, NIST SP 1065): by third differences of the running sum, on which a linear drift of the
+//! rate has no effect.
 
 use crate::cascade::Cascade;
 use crate::confidence::{ChiSquareApproximation, Difference};
@@ -105,7 +106,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         for octave in 0..OCTAVES - 1 {
             let (level, n) = place::<OVERLAP>(octave);
             if !cascade.ends_stride(level) {
-                return; // nor of longer averaging times
+                return; // longer averaging times end no stride either
             }
             if cascade.span(octave) < 3 << octave {
                 continue;
@@ -155,8 +156,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         points
     }
 
-    /// [`points`](Self::points) with the confidence of the variance fractions that `fractions` returns for an averaging
-    /// factor.
+    /// [`points`](Self::points) with degrees of freedom and bounds from the variance fractions that `fractions` returns
+    /// for an averaging factor.
     #[must_use]
     pub fn points_with(
         &self,

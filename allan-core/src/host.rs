@@ -7,12 +7,12 @@ use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
 use crate::model::Model;
 use crate::term::{AllTerms, NoiseTerm};
 
-/// Part of a measured variance that remains of it when rounding is taken off.
+/// Least fraction of a measured variance that remains after the variance of rounding is subtracted.
 const LEAST_LEFT: f64 = 0.01;
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    /// This curve at averaging factors below `from`, and at longer ones that of `means`, the curve of the means of each
-    /// `samples` samples in a row. The longest averaging times are left out if there is no room.
+    /// Joins this curve, at averaging factors below `from`, and `means`, the curve of the means of `samples`
+    /// consecutive samples, at longer ones. The longest averaging times are left out if there is no room.
     #[must_use]
     pub fn continued_by_means(mut self, means: &Self, samples: u64, from: u64) -> Self {
         self.points.retain(|point| point.n < from);
@@ -24,8 +24,9 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self
     }
 
-    /// Subtracts `variance` of its averaging factor for rounding to counts from every point, down to a hundredth of
-    /// what was measured. It becomes part of `interpolation`.
+    /// Subtracts the variance of rounding to counts, `variance(n)` in the square of the unit, from the point at each
+    /// averaging factor `n`. At least a hundredth of the measured variance remains. The subtracted part is added to
+    /// `interpolation`.
     pub fn subtract_rounding(&mut self, variance: impl Fn(u64) -> f64) {
         for point in &mut self.points {
             let left = (point.avar - variance(point.n)).max(LEAST_LEFT * point.avar);
@@ -34,7 +35,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.reset_confidence();
     }
 
-    /// Replaces the positive variances; the bounds change in proportion.
+    /// Replaces the positive variances by those that `avar` returns, in the same unit; the bounds change in proportion.
     pub fn replace_avar(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
         self.set_variances(avar);
     }
@@ -63,7 +64,7 @@ impl<const OCTAVES: usize> NewestDifferences<OCTAVES> {
 }
 
 impl<const OCTAVES: usize> Coupling<OCTAVES> {
-    /// As [`observe`](Self::observe), by the newest differences of both channels.
+    /// Adds the products of the newest differences of two channels, as [`observe`](Self::observe) does.
     pub fn observe_differences(&mut self, a: &NewestDifferences<OCTAVES>, b: &NewestDifferences<OCTAVES>) {
         self.add_newest(a.now == b.now, a.due, |octave| (a.octaves[octave], b.octaves[octave]));
     }
@@ -86,7 +87,7 @@ pub fn fit_shapes_except<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm
 pub struct DevianceComparison<'a>(Baseline<'a>);
 
 impl<'a> DevianceComparison<'a> {
-    /// For `curve`, with the degrees of freedom of `model`.
+    /// A comparison for `curve`, with the degrees of freedom of `model`.
     #[must_use]
     pub fn new(curve: impl Into<CurveView<'a>>, model: &Model) -> Self {
         let mut baseline = Baseline::empty(curve.into());

@@ -1,4 +1,4 @@
-//! The part of the interpolation of missing samples in an Allan or Hadamard variance.
+//! The variance that interpolating missing samples adds to an Allan or Hadamard variance.
 
 use crate::confidence::Difference;
 use crate::math::Real;
@@ -88,9 +88,9 @@ pub(crate) struct BridgedGaps<F = f64> {
     replaced: F,
     /// Sum over the gaps of the expected squared error of the sum of their samples, counts².
     squared_error: F,
-    /// The same, each multiplied by the length of the gap.
+    /// Sum over the gaps of that squared error times the length of the gap, counts²·samples.
     squared_error_length: F,
-    /// Replaced samples of classes without a test.
+    /// Number of replaced samples in classes without a test.
     untested: F,
     tested: F,
     tested_error: F,
@@ -99,9 +99,9 @@ pub(crate) struct BridgedGaps<F = f64> {
 /// The variance that the bridged gaps add at an averaging factor, and the share of the samples that is replaced.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AddedVariance<F = f64> {
-    /// Counts².
+    /// The added variance, counts².
     pub(crate) variance: F,
-    /// Between 0 and 1.
+    /// The replaced share of the samples, 0 to 1.
     pub(crate) replaced: F,
 }
 
@@ -115,7 +115,7 @@ impl<F: Real> AddedVariance<F> {
     }
 }
 
-/// Factor on the degrees of freedom of a measured variance of which `subtracted` was taken and `left` remains.
+/// Factor on the degrees of freedom of a measured variance after a subtraction: the square of the remaining fraction.
 pub(crate) fn subtraction_factor<F: Real>(left: F, subtracted: F) -> F {
     if subtracted > F::ZERO {
         let share = left / (left + subtracted);
@@ -126,7 +126,7 @@ pub(crate) fn subtraction_factor<F: Real>(left: F, subtracted: F) -> F {
 }
 
 impl<F: Real> BridgedGaps<F> {
-    /// No gaps, in a record with an Allan variance of `white` counts² at one sample.
+    /// No gaps yet, in a record with an Allan variance of `white` counts² at one sample.
     pub(crate) fn new(white: F) -> Self {
         let none = F::constant(0.0);
         Self {
@@ -175,7 +175,7 @@ impl<F: Real> BridgedGaps<F> {
             Difference::Third => F::constant(20.0 / 9.0),
         };
         let n = F::from_word(n);
-        // Gaps without a test of their own length are taken to be off as those with one, or as white noise would be.
+        // Gaps without a test of their own length get the error of those with one, or else that of white noise.
         let per_sample =
             if self.tested > none { self.tested_error / self.tested } else { F::constant(1.5) * self.white };
         let squared_error = self.squared_error - edges * self.squared_error_length / n + self.untested * per_sample;
@@ -201,9 +201,9 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 1e-14, "{found}, expected {expected}");
     }
 
-    /// A sample that is replaced by the mean of its two neighbours is off by its own noise and by half of theirs: `3/2 σ²`.
+    /// A sample replaced by the mean of its two neighbours has the error of its own noise and half of theirs: `3/2 σ²`.
     #[test]
-    fn gaps_without_a_test_are_off_as_white_noise_would_be() {
+    fn gaps_without_a_test_add_the_variance_of_white_noise() {
         let AddedVariance { variance, replaced } = added(Interpolation::new(100, 0, 0), 64);
         assert_close(variance, 100.0 * 1.5 * WHITE / 64.0 / 1_000.0);
         assert_close(replaced, 0.1);
@@ -211,7 +211,7 @@ mod tests {
 
     /// A gap of 6 samples adds its squared error less `2·6/64` of it in the octave of 64.
     #[test]
-    fn what_a_gap_adds_becomes_less_with_its_length() {
+    fn the_variance_that_a_gap_adds_falls_with_its_length() {
         let tested = Interpolation::new(100, 50, 7_000);
         assert_close(added(tested, 64).variance, 14_000.0 * (1.0 - 12.0 / 64.0) / 64.0 / 1_000.0);
         assert_close(added(tested, 8).variance, 14_000.0 * (1.0 - 2.0 / 8.0) / 8.0 / 1_000.0);

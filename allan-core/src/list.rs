@@ -1,4 +1,4 @@
-//! A list in place, in this crate's own type: so that the version of `heapless` is no part of the API.
+//! A list stored in place. It is this crate's own type, so that the version of `heapless` is not part of the API.
 
 use core::ops::{Deref, DerefMut};
 use heapless::Vec;
@@ -9,7 +9,7 @@ use heapless::Vec;
 pub struct List<T, const N: usize>(Vec<T, N>);
 
 impl<T, const N: usize> List<T, N> {
-    /// Without values.
+    /// An empty list.
     #[must_use]
     pub const fn new() -> Self {
         Self(Vec::new())
@@ -54,7 +54,7 @@ impl<T, const N: usize> DerefMut for List<T, N> {
     }
 }
 
-/// The first `N` values.
+/// Takes the first `N` values.
 impl<T, const N: usize> FromIterator<T> for List<T, N> {
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
         Self(values.into_iter().take(N).collect())

@@ -168,7 +168,7 @@ pub(crate) fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
 
-/// As `f64::clamp`, without the 12 kB of flash of its panic's message.
+/// Limits `x` to `low..=high`. `f64::clamp` would link 12 kB of flash for the message of its panic.
 pub(crate) fn clamp<F: Real>(x: F, low: F, high: F) -> F {
     if x < low {
         low

@@ -38,7 +38,7 @@ impl FittedTerm {
         Self { kind, value, low: value, high: value, shape }
     }
 
-    /// The same term with other 95 % bounds of its coefficient.
+    /// Returns the term with other 95 % bounds of its coefficient.
     #[must_use]
     pub const fn with_bounds(self, low: f64, high: f64) -> Self {
         Self { low, high, ..self }
@@ -99,19 +99,21 @@ impl Model {
         &mut self.terms
     }
 
-    /// The filter behind which its white noise is, if it has a term of such noise.
+    /// The low-pass filter of the model's white noise; `None` without a term of filtered white noise.
     #[must_use]
     pub fn filter(&self) -> Option<MovingAverageFilter> {
         filter_of(self.terms.iter().map(|term| &term.kind))
     }
 
-    /// The part of a term in the Allan variance at averaging factor `n`, behind the [`filter`](Self::filter).
+    /// Allan variance of a term at averaging factor `n`, in the square of the unit: `value²` times
+    /// [`NoiseTerm::avar`] behind the [`filter`](Self::filter).
     #[must_use]
     pub fn part(&self, term: &FittedTerm, n: u64) -> f64 {
         term.value * term.value * term.kind.avar_behind(self.filter().as_ref(), n, self.sample_period)
     }
 
-    /// Modelled Allan variance at averaging factor `n`.
+    /// Modelled Allan variance at averaging factor `n`, in the square of the unit: the sum of the
+    /// [`part`](Self::part)s of all terms.
     #[must_use]
     pub fn avar(&self, n: u64) -> f64 {
         self.contributions(n).map(|(_, avar)| avar).sum()
@@ -123,7 +125,7 @@ impl Model {
         self.present().map(|term| self.part_of_density(term, frequency)).sum()
     }
 
-    /// The part of a term in the [`density`](Self::density) at `frequency` in Hz.
+    /// Contribution of a term to the [`density`](Self::density) at `frequency` in Hz, in unit²/Hz.
     #[must_use]
     pub fn part_of_density(&self, term: &FittedTerm, frequency: f64) -> f64 {
         let density = term.value * term.value * term.kind.process().density(frequency, self.sample_period);
@@ -148,7 +150,8 @@ impl Model {
         )
     }
 
-    /// Equivalent degrees of freedom of a measured point if the model is correct.
+    /// Equivalent degrees of freedom of a measured point if the model is correct, at most 10¹⁸ (Greenhall and Riley; see
+    /// [`confidence`](crate::confidence)).
     #[must_use]
     pub fn edf(&self, point: &AllanPoint) -> f64 {
         let avar = self.avar(point.n);
@@ -157,7 +160,7 @@ impl Model {
         degrees_of_freedom::<AllTerms>(&parts, point, self.sample_period, &FlickerCorrelations::EMPTY).0
     }
 
-    /// The same model in another unit: every coefficient is multiplied by `lsb`, units per count.
+    /// Returns the model in another unit: every coefficient is multiplied by `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
         for term in &mut self.terms {
@@ -351,7 +354,7 @@ impl FlickerCorrelations {
     }
 }
 
-/// [`add_correlations`] of flicker noise, which do not depend on the averaging factor.
+/// [`add_correlations`] for flicker noise, whose correlations do not depend on the averaging factor.
 fn add_flicker_correlations<T: TermSet>(share: f32, overlap: u32, sums: &mut [f32]) {
     add_correlations::<T>(&NoiseTerm::BiasInstability, share, u64::from(overlap), overlap, 1.0, sums);
 }
@@ -419,7 +422,7 @@ mod tests {
                 let square = |curve: &Curve<12>| (curve.points()[at].avar / expected - 1.0).powi(2);
                 let scatter = curves.iter().map(square).sum::<f64>() / PHASES as f64;
                 let modelled = 2.0 / model.edf(point);
-                // The mean over the phases is exact; below 10⁻⁸ it is the rounding of the samples.
+                // The mean over the phases is exact. A scatter below 10⁻⁸ is the rounding of the samples.
                 assert!((modelled / scatter - 1.0).abs() < 0.02 || scatter < 1e-8, "{}: {modelled} {scatter}", point.n);
                 shown += usize::from(scatter > 1e-4);
             }
@@ -431,7 +434,7 @@ mod tests {
     fn second_differences_correlate_as_the_autocovariance_says() {
         for kind in stationary() {
             let n = 6_usize;
-            // The second difference of averages is a filter of 2n weights; at n = 6, lags on both sides of 2n.
+            // The second difference of averages is a filter of 2n weights. The lags are on both sides of 2n.
             let weights: Vec<f64> = (0..2 * n).map(|i| if i < n { 1.0 } else { -1.0 } / n as f64).collect();
             let mut correlations = [0.0; 31];
             add_correlations::<AllTerms>(&kind, 1.0, n as u64, n as u32, PERIOD, &mut correlations);

@@ -31,13 +31,13 @@ impl PowerLaw {
         }
     }
 
-    /// Binary logarithm of its Allan variance at `n = 2^octave` samples, but for a constant.
+    /// Binary logarithm of its Allan variance at `n = 2^octave` samples, up to a constant.
     fn log2_avar(self, octave: f64) -> f64 {
         match self {
             Self::Quantization => -2.0 * octave,
             Self::White => -octave,
             Self::Flicker => 0.0,
-            // A sampled walk has (2n² + 1)/(6n): at n = 1 half as much again as n/3, at n = 2 an eighth.
+            // A sampled walk has (2n² + 1)/(6n): 1.5 times n/3 at n = 1, 1.125 times at n = 2.
             Self::RandomWalk => octave + [0.585, 0.17, 0.04].get(octave as usize).copied().unwrap_or(0.0),
         }
     }

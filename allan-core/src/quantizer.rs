@@ -20,7 +20,7 @@ use core::fmt;
 /// | 3σ | +9.7 % | +51.6 % |
 /// | 4σ | −14.7 % | +100.1 % |
 ///
-/// An LSB of σ/4 or less costs nothing that matters; beyond 2σ the curve is that of the rounding.
+/// An LSB of σ/4 or less has a negligible effect; beyond 2σ rounding dominates the curve.
 ///
 /// ```
 /// use allan_core::{Cascade, Quantizer};
@@ -51,7 +51,7 @@ const SHIFT: f64 = 6_755_399_441_055_744.0;
 /// Steps up to which every count fits.
 const LARGEST_IN_BLOCK: f64 = i32::MAX as f64;
 
-/// Why a value has no count.
+/// The reason for which a value has no count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SampleError {
@@ -98,7 +98,7 @@ impl Quantizer {
     #[must_use]
     pub fn for_samples(samples: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (mut origin, mut previous) = (None, f64::NAN);
-        // Four sums in turn: each addition waits for the one before to the same sum.
+        // Four sums take turns, since an addition to the same sum must wait for the one before.
         let (mut sums, mut count) = ([0.0; 4], 0_u64);
         for value in samples {
             if origin.is_none() && is_finite(value) {
@@ -112,7 +112,7 @@ impl Quantizer {
             }
         }
         let finest = sqrt(sums.iter().sum::<f64>() / (2.0 * count as f64)) * (1.0 / STEPS);
-        // Without its fraction a normal number is a power of two.
+        // A normal number without its fraction is a power of two.
         let lsb = f64::from_bits(finest.to_bits() >> 52 << 52);
         if finest.is_normal() { Self::new(origin?, lsb) } else { None }
     }
@@ -177,7 +177,7 @@ impl Quantizer {
             let mut all_fit = true;
             for (count, &value) in counts[start..end].iter_mut().zip(&values[start..end]) {
                 let steps = steps(value.into() - self.origin);
-                // False for what is not a number.
+                // The comparison is false for NaN.
                 all_fit &= abs(steps) <= LARGEST_IN_BLOCK;
                 // The low bits of the sum are the nearest integer, ties to even, in two's complement.
                 let shifted = steps + SHIFT;

@@ -30,7 +30,7 @@ const SIGNIFICANT: f64 = 4.5;
 /// Allan covariances of two channels, by averaging factor, in the product of their units.
 pub type CovarianceCurve<const POINTS: usize> = List<Covariance, POINTS>;
 
-/// Noise over variance of a covariate above which an octave is not used.
+/// Ratio of noise to variance of a covariate above which an octave is not used.
 const NOISE_FRACTION: f64 = 0.5;
 
 /// First Allan variance, in LSB², above which the noise of a covariate dithers its rounding to counts.
@@ -52,7 +52,7 @@ pub struct Covariate<const POINTS: usize> {
 }
 
 impl<const POINTS: usize> Covariate<POINTS> {
-    /// A covariate with this curve, one count of which is `lsb`; its measurement noise is estimated.
+    /// A covariate with this curve, of which one count is `lsb` in its unit; its measurement noise is estimated.
     ///
     /// Averaging factors below `from` and beyond the first `POINTS` are not used.
     #[must_use]
@@ -81,7 +81,7 @@ impl<const POINTS: usize> Covariate<POINTS> {
         }
     }
 
-    /// The same covariate in another stretch of time, with the measurement noise of this one.
+    /// Returns the covariate for another stretch of time, with the measurement noise of this one.
     #[must_use]
     pub fn continued<const MEASURED: usize>(&self, curve: &Curve<MEASURED>, from: u64) -> Self {
         Self { noise: self.noise, rounding: self.rounding, ..Self::as_measured(curve, from) }
@@ -107,7 +107,7 @@ type Sensitivities = List<Sensitivity, MAX_COVARIATES>;
 pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
     /// Curve of the channel, in its unit.
     pub channel: &'a Curve<POINTS>,
-    /// At most [`MAX_COVARIATES`].
+    /// The covariates, at most [`MAX_COVARIATES`].
     pub covariates: &'a [Covariate<COUPLED>],
     /// The Allan covariance of the channel (first argument `None`) or of a covariate with the covariate of the second
     /// argument; `None` if not known.
@@ -115,7 +115,8 @@ pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = P
 }
 
 impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, COUPLED> {
-    /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen.
+    /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen,
+    /// which is at least 4.5 normal standard deviations.
     ///
     /// # Cost
     /// | `CovariateRegression::sensitivities` | Cortex-M4F | Cortex-M0+ |
@@ -130,7 +131,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         self.sensitivities_while(&mut || true).unwrap_or_default()
     }
 
-    /// As [`sensitivities`](Self::sensitivities), calling `keep_on` before every fit; `None` if it returned false.
+    /// [`sensitivities`](Self::sensitivities) that calls `keep_on` before every fit; `None` if it returned false.
     #[must_use]
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
     pub fn sensitivities_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<List<Sensitivity, MAX_COVARIATES>> {
@@ -240,7 +241,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         curve.set_variances(|point| {
             let change = |a: &Sensitivity| {
                 let with_channel = self.with_channel(a.covariate, point.n);
-                // Without a variance of its own, the channel's covariance has the share: `cov(y, c) = β·σ²(c)`.
+                // If the covariate's own variance is not usable, `β·cov(y, c)` stands for `β²·σ²(c)`.
                 if self.covariates[a.covariate].signal(point.n).is_none() {
                     return -a.value * with_channel;
                 }

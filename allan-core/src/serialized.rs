@@ -21,7 +21,7 @@ pub(crate) trait StateWords: Clone {
     /// Identifies the type in the header.
     const KIND: u8;
     const OCTAVES: usize;
-    /// 0 if the type has no such parameter.
+    /// Const parameter `OVERLAP`; 0 if the type has none.
     const OVERLAP: usize;
     const WORDS: usize;
 
@@ -60,7 +60,7 @@ pub(crate) fn deserialize_in_place<'de, S: StateWords, D: Deserializer<'de>>(
     state: &mut S,
 ) -> Result<(), D::Error> {
     deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor(Some(&mut *state))).inspect_err(|_| {
-        // As `EMPTY`, which would be built on the stack first.
+        // All words are set to 0 in place: `EMPTY` would be built on the stack first.
         let Ok(()) = state.visit_words(|word| {
             *word = 0;
             Ok::<_, Infallible>(())
@@ -68,7 +68,7 @@ pub(crate) fn deserialize_in_place<'de, S: StateWords, D: Deserializer<'de>>(
     })
 }
 
-/// Checks all but the meaning of the words, and keeps none of them.
+/// Checks everything except the meaning of the words, and keeps none of them.
 pub(crate) fn check<'de, S: StateWords, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
     deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor::<S>(None))
 }

@@ -27,19 +27,22 @@ pub struct SlopeEstimate {
 }
 
 /// The accuracy `100/√(2(N/n − 1))` in percent of a point at averaging factor `n` of `N = samples` (IEEE 952, annex C).
+/// It is infinite at `n = N`, and not a number above.
 #[must_use]
 pub fn percentage_accuracy(samples: u64, n: u64) -> f64 {
     100.0 / math::sqrt(2.0 * (samples as f64 / n as f64 - 1.0))
 }
 
-/// N: the value at τ = 1 s of the line of slope −½ through the longest interval of this slope left of the minimum.
+/// N, in unit·√s: the value at τ = 1 s of the line of slope −½ through the longest interval of this slope left of the
+/// minimum. `None` if no two neighbouring points have this slope within [`LINE_TOLERANCE`].
 #[must_use]
 pub fn angle_random_walk<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
     let (points, lowest) = accurate_points(curve.into())?;
     on_line(&points[..=lowest], -0.5, 1.0)
 }
 
-/// B: the minimum of σ times `√(π/(2 ln 2))`, if it lies in a flat interval.
+/// B, in the unit of the curve: the minimum of σ times `√(π/(2 ln 2))`. `None` if the minimum is not in an interval that
+/// is flat within [`FLAT_TOLERANCE`].
 #[must_use]
 pub fn bias_instability<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
     let (points, lowest) = accurate_points(curve.into())?;
@@ -48,7 +51,8 @@ pub fn bias_instability<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEsti
     Some(SlopeEstimate { value: math::sqrt(points[lowest].avar * PI / (2.0 * LN_2)), interval: interval(flat) })
 }
 
-/// K: the value at τ = 3 s of the line of slope +½ through the longest interval of this slope right of the minimum.
+/// K, in unit/√s: the value at τ = 3 s of the line of slope +½ through the longest interval of this slope right of the
+/// minimum. `None` if no two neighbouring points have this slope within [`LINE_TOLERANCE`].
 #[must_use]
 pub fn rate_random_walk<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
     let (points, lowest) = accurate_points(curve.into())?;

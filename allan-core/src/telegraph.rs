@@ -44,7 +44,7 @@ pub fn kurtosis_ratio<'a>(curve: impl Into<CurveView<'a>>, model: &Model, markov
         let share = model.part(term, point.n) / model.avar(point.n);
         let tau = sqrt(point.tau * point.tau + smoothed * smoothed);
         let expected = share * share * expected(tau / markov.time_constant);
-        // The variance of the sample kurtosis of so many independent Gaussian values is 24/edf.
+        // The sample kurtosis of `edf` independent Gaussian values has the variance 24/edf.
         let precision = model.edf(point) / 24.0;
         along += precision * expected * measured;
         weight += precision * expected * expected;

@@ -139,7 +139,7 @@ impl NoiseTerm {
         }
     }
 
-    /// Its shape parameters, times in s and frequencies in Hz.
+    /// Shape parameters of the term, times in s and frequencies in Hz.
     #[must_use]
     pub const fn shape(&self) -> Shape {
         match self {
@@ -154,7 +154,7 @@ impl NoiseTerm {
         }
     }
 
-    /// The same term with other shape parameters, in the order of [`shape`](Self::shape).
+    /// Returns the term with other shape parameters, in the order of [`shape`](Self::shape).
     #[must_use]
     pub(crate) fn with_shape(self, shape: [f64; MAX_SHAPE]) -> Self {
         match self {
@@ -189,7 +189,8 @@ impl NoiseTerm {
         with_process!(self, process => process)
     }
 
-    /// Allan variance at averaging factor `n` and `sample_period` seconds for a coefficient of 1.
+    /// Allan variance at averaging factor `n` and `sample_period` seconds for a coefficient of 1, by the formula of the
+    /// term's [process](Self::process).
     #[must_use]
     pub fn avar(&self, n: u64, sample_period: f64) -> f64 {
         with_process!(self, process => process.avar(n, sample_period))
@@ -256,7 +257,7 @@ impl NoiseTerm {
                 VarianceFractions { random_walk: fraction, ..none }
             }
             Self::LowPass(filter) if PI * filter.frequency * n as f64 * sample_period < filter.damping => {
-                // Shorter than the mean of its impulse response, 2ζ/ω₀, as that of a moving average is half of its length.
+                // The averaging time is below the mean of the impulse response, 2ζ/ω₀ (for a moving average: half its length).
                 VarianceFractions { random_walk: fraction, ..none }
             }
             Self::Filtered(_) | Self::LowPass(_) => VarianceFractions { white: fraction, ..none },
@@ -276,7 +277,7 @@ impl NoiseTerm {
 mod tests {
     use super::{Markov, NoiseTerm, WALK_UP_TO, WHITE_FROM};
 
-    /// The slopes of the process's own curve, of a time constant of a million samples.
+    /// The slopes are taken from the process's own curve, with a time constant of a million samples.
     #[test]
     fn a_gauss_markov_process_has_the_slopes_that_it_is_classified_by() {
         let process = NoiseTerm::Markov(Markov { time_constant: 1e6 }).process();

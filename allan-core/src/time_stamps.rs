@@ -27,7 +27,7 @@ pub struct TimeStamps {
     last: Option<u64>,
 }
 
-/// Why a sample with this time stamp cannot be added.
+/// The reason for which a sample with this time stamp cannot be added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TimeStampError {
@@ -95,7 +95,7 @@ impl TimeStamps {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
     /// # Errors
-    /// As [`missing`](Self::missing); the sample is not added.
+    /// Those of [`missing`](Self::missing); the sample is not added.
     pub fn push<const OCTAVES: usize, const OVERLAP: usize>(
         &mut self,
         cascade: &mut Cascade<OCTAVES, OVERLAP>,

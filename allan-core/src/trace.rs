@@ -87,7 +87,7 @@ impl Trace {
         Self { before, before_goodness: nothing, after, after_goodness: nothing, added: List::new() }
     }
 
-    /// Makes it the [`baseline`](Self::baseline) of `curve`.
+    /// Replaces the trace by the [`baseline`](Self::baseline) of `curve`.
     pub fn fit_baseline<'a>(&mut self, curve: impl Into<CurveView<'a>>) {
         self.fit_baseline_in(curve.into());
     }
@@ -104,7 +104,7 @@ impl Trace {
 }
 
 /// Fits N, B and K to `curve` and adds the missing terms, the most significant first, until no candidate is
-/// significant.
+/// significant: a term must reduce the deviance by 14 times its scatter, and by 4 more for each further parameter.
 ///
 /// The candidates are quantization, a rate ramp, Markov processes, the `lines`, and digital low-pass filters with the
 /// starting shapes `filters`, with a decimation of 1 where every value is read. The first 64 of each are used.
@@ -126,8 +126,8 @@ pub fn trace<'a>(curve: impl Into<CurveView<'a>>, lines: LineCandidates, filters
     trace
 }
 
-/// As [`trace`], for a `trace` that holds the curve's [`Trace::baseline`]. If `keep_on`, called before every fit of a
-/// candidate, returns false, the trace is left unfinished and the result is false.
+/// Runs [`trace`] on a `trace` that holds the curve's [`Trace::baseline`]. `keep_on` is called before every fit of a
+/// candidate. If it returns false, the trace is left unfinished and the result is false.
 #[must_use]
 pub fn trace_while<'a>(
     trace: &mut Trace,
@@ -223,7 +223,8 @@ impl Search<'_> {
         let families = self.families;
         let mut kinds = model.kinds();
         let known = kinds.len();
-        // As many terms as points fit every curve, and a point is not measured if half of its samples were replaced.
+        // A model with as many terms as points fits every curve. A point does not count if half of its samples were
+        // replaced.
         let is_measured = |point: &&AllanPoint| point.avar > 0.0 && point.replaced < 0.5;
         if curve.points().iter().filter(is_measured).count() <= known {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Hands the linker this board's memory map.
+//! Gives the linker this board's memory map.
 
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");

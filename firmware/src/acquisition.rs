@@ -32,12 +32,12 @@ pub struct TimedBurst {
     pub burst: Option<Burst>,
 }
 
-/// Edges in [`OSCILLATION_US`] that mask the data-ready line; a sensor gives at most 1.2 a millisecond.
+/// Number of edges within [`OSCILLATION_US`] that mask the data-ready line; a sensor gives at most 1.2 edges per ms.
 const OSCILLATION_EDGES: u32 = 16;
-/// µs.
+/// Time in which edges are counted, µs.
 const OSCILLATION_US: u64 = 1_000;
 
-/// The action at a data-ready edge.
+/// The action that a data-ready edge requires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EdgeAction {
     /// Nothing: sampling is disabled, or a burst is being transferred.
@@ -55,9 +55,9 @@ pub struct SamplingActivity {
     pub started: u32,
     /// Transfers ended, whether the burst was queued or dropped.
     pub ended: u32,
-    /// Times that the data-ready line was masked, since it oscillated.
+    /// Times that the data-ready line was masked because it oscillated.
     pub masked: u32,
-    /// True if it is masked now.
+    /// True if the line is masked now.
     pub is_masked: bool,
 }
 
@@ -68,7 +68,7 @@ pub struct Sampler<'q> {
     reading: Option<u64>,
     dropped: u32,
     activity: SamplingActivity,
-    /// Edges since this time, in µs.
+    /// Number of edges since a time, and that time in µs.
     edges: (u32, u64),
 }
 
@@ -98,7 +98,8 @@ impl<'q> Sampler<'q> {
         self.activity
     }
 
-    /// To be called at every data-ready edge; returns what must be done now; a sample during a transfer is lost.
+    /// Takes a data-ready edge and returns the required action. It must be called at every edge; a sample during a
+    /// transfer is lost.
     #[must_use]
     pub fn data_ready(&mut self, at_us: u64) -> EdgeAction {
         let (edges, since_us) = &mut self.edges;
@@ -120,7 +121,7 @@ impl<'q> Sampler<'q> {
         EdgeAction::StartBurst
     }
 
-    /// To be called at the end of a transfer with the bytes received, or `None` if it failed.
+    /// Takes the end of a transfer with the bytes received, or `None` if it failed.
     pub fn transfer_ended(&mut self, received: Option<&[u8; BURST_BYTES]>) {
         let Some(at_us) = self.reading.take() else { return };
         self.activity.ended = self.activity.ended.wrapping_add(1);
@@ -132,12 +133,12 @@ impl<'q> Sampler<'q> {
     }
 }
 
-/// How a data-ready edge fits the ones before.
+/// Relation of a data-ready edge to the ones before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DrdyEdge {
     /// Number of sample periods since the edge before; 1 if no edge was lost, and for the first edge.
     Periods(u32),
-    /// Spurious: at no multiple of the sample period.
+    /// The edge is spurious: not at a multiple of the sample period.
     Spurious,
 }
 
@@ -148,7 +149,7 @@ pub struct DataReadyMonitor {
     period_q8: u64,
     last_us: Option<u64>,
     probed_us: u64,
-    /// Periods between edges so far, and the time that they took.
+    /// Periods between edges so far, and their total time.
     periods: u64,
     elapsed_us: u64,
     /// Rises with every irregular edge, falls with every regular one.
@@ -174,7 +175,7 @@ impl DataReadyMonitor {
         };
         let interval_us = at_us.saturating_sub(last_us);
         let (interval, period) = (interval_us << 8, self.mean_period_q8());
-        // Damaged memory: the main loop restarts the device.
+        // A period of 0 means damaged memory: the main loop restarts the device.
         let Some(periods) = (interval + period / 2).checked_div(period) else { return DrdyEdge::Spurious };
         let deviation = interval.abs_diff(periods * period);
         if core::mem::take(&mut self.new_phase) {
@@ -214,12 +215,12 @@ impl DataReadyMonitor {
         now_us.saturating_sub(last_sign_us) > self.silence_us()
     }
 
-    /// False only with damaged memory.
+    /// True unless memory is damaged.
     pub(crate) const fn has_period(&self) -> bool {
         self.period_q8 > 0
     }
 
-    /// Clears the suspicion at `now_us`, after a probe or a pause of the device's own.
+    /// Clears the suspicion at `now_us`, after a probe or a pause of sampling by the device.
     pub fn restart_at(&mut self, now_us: u64) {
         self.probed_us = now_us;
         self.new_phase = true;
@@ -282,7 +283,7 @@ mod tests {
             assert_eq!(monitor.measured_hz(), None);
             assert_eq!(feed(&mut monitor, (0..10_000).map(f64::from), fast), [10_000, 0, 0]);
             let measured = monitor.measured_hz().unwrap();
-            // Truncated to µs: 1 µs in 10,000 periods.
+            // Times are truncated to µs: 1 µs in 10,000 periods.
             assert!((measured * fast / 204.8 - 1.0).abs() < 1.0 / (9_999.0 * PERIOD_US * fast), "{measured}");
             assert!(!monitor.is_suspect());
         }

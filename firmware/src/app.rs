@@ -25,7 +25,7 @@ use link::{Boot, BootCause, Health, MessageRef, text_line};
 
 /// The start-up data of a board for the application.
 pub struct Start {
-    /// Why the microcontroller started, and the crash record.
+    /// The reason for the start, and the crash record.
     pub boot: Boot,
     /// The retained RAM.
     pub retained: RetainedRam,
@@ -33,18 +33,18 @@ pub struct Start {
     pub finished: &'static mut FinishedEpoch,
 }
 
-/// Time for which a write to the sensor's flash stays armed.
+/// Time for which a write to the sensor's flash stays armed, µs.
 const ARMED_US: u64 = 10_000_000;
-/// Least time between two writes of models without a command.
+/// Least time between two writes of models without a command, µs.
 const KEEP_US: u64 = 3_600_000_000;
-/// Time between two checkpoints of one channel each.
+/// Time between two checkpoints of one channel each, µs.
 const CHECKPOINT_US: u64 = 100_000;
 
 /// The application.
 pub struct App {
     state: DeviceState,
     retained: RetainedRam,
-    /// One for each port: lines are not mixed.
+    /// One parser for each port, so that lines are not mixed.
     parsers: [CommandParser; HostPort::COUNT],
     console: Console,
     report: ReportProgress,
@@ -74,8 +74,8 @@ fn interval_us(settings: RetainedSettings) -> u64 {
 }
 
 impl App {
-    /// Restores settings and statistics from retained RAM; nothing after three crashes within ten minutes, which stored
-    /// data may cause.
+    /// Restores settings and statistics from retained RAM. After three crashes within ten minutes it restores nothing,
+    /// since stored data may be the cause.
     pub fn new(start: Start, board: &mut impl Board) -> Self {
         let Start { mut boot, mut retained, finished } = start;
         let has_crashed = boot.cause == BootCause::Watchdog || !boot.crash_record.is_empty();
@@ -104,7 +104,7 @@ impl App {
             }
         }
         retained.write_settings(settings, first);
-        // The device restarted while learning: its report starts again.
+        // If the device restarted while learning, the report of the epoch starts again.
         let interrupted = !first
             && learner.finished.as_deref_mut().is_some_and(|finished| {
                 retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch
@@ -120,7 +120,7 @@ impl App {
             report.start_epoch_end();
         }
         let now_us = board.now_us();
-        // After other restarts the sensor may be starting up too.
+        // After any other restart the sensor may be starting up too.
         let sensor_runs = matches!(boot.cause, BootCause::Pin | BootCause::Software | BootCause::Watchdog);
         let probe_us = if sensor_runs { now_us } else { now_us + START_UP_US };
         Self {
@@ -153,17 +153,17 @@ impl App {
         }
     }
 
-    /// One pass of the main loop: all commands received, at most one message. Returns false if nothing is left before
-    /// the next interrupt.
+    /// One pass of the main loop: all received commands and at most one message. Returns false if nothing is left
+    /// before the next interrupt.
     pub fn turn(&mut self, board: &mut impl Board) -> bool {
         self.service(board);
         self.transmit(board)
     }
 
-    /// The urgent work, also during a fit: watchdog, commands, sensor, checkpoints, timers.
+    /// Does the urgent work, also during a fit: watchdog, commands, sensor, checkpoints, timers.
     fn service(&mut self, board: &mut impl Board) {
         if !self.tasks.are_alive(board) {
-            return; // nothing that would feed the watchdog
+            return; // the watchdog must not be fed
         }
         board.feed_watchdog();
         while let Some((port, byte)) = board.receive() {
@@ -379,7 +379,8 @@ impl App {
                 self.reset_statistics(board);
                 match bias.host_x {
                     0 => self.print(board, format_args!("bias nulled, statistics reset")),
-                    // A driver keeps it: bursts lose the sign of x (erratum). The Allan variance does not depend on it.
+                    // The driver keeps a negative x, since bursts lose its sign (erratum). The Allan variance does not
+                    // depend on it.
                     x => self.print(
                         board,
                         format_args!("bias of y and z nulled, statistics reset; x: {x} counts not applied by the part"),
@@ -390,7 +391,7 @@ impl App {
         }
     }
 
-    /// Keeps settings and models without power; returns the pause of sampling in µs.
+    /// Stores settings and models in flash; returns the pause of sampling in µs.
     #[inline(never)]
     fn persist(&mut self, board: &mut impl Board) -> Result<u64, StoreError> {
         let raw_stream = board.estimators(|estimators| estimators.raw_stream.is_on());
@@ -401,7 +402,7 @@ impl App {
         self.write_record(record, board)
     }
 
-    /// Once an hour at most: a write costs samples.
+    /// Stores the models once an hour at most, since a write costs samples.
     fn keep_models(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         if now_us < self.next_kept_us {
@@ -434,7 +435,8 @@ impl App {
         }
     }
 
-    /// Writes channel by channel, then the epoch's age, once in 0.8 s each, or at once behind a fit.
+    /// Writes one channel per [`CHECKPOINT_US`], and the epoch's age after the last: each once in 0.8 s, or at once
+    /// after a fit.
     fn checkpoint(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         for _ in 0..CHANNELS.len() {
@@ -495,7 +497,7 @@ impl App {
         board.estimators(|estimators| finished.fill(estimators));
         finished.number = self.state.settings.epoch;
         event!(info, "epoch {=u32} finished", finished.number);
-        // Before the settings: a restart in between finds the epoch running or finished.
+        // The epoch is written before the settings: a restart in between finds it either running or finished.
         self.retained.write_epoch(finished);
         self.state.settings.epoch = self.state.settings.epoch.saturating_add(1);
         self.report.start_epoch_end();
@@ -512,7 +514,7 @@ impl App {
         let ends_epoch = self.report.ends_epoch();
         let Some(part) = self.report.part() else {
             if ends_epoch {
-                self.retained.clear_epoch(); // it has been learned from
+                self.retained.clear_epoch(); // the learner is done with it
                 self.keep_models(board);
             }
             return;
@@ -527,7 +529,7 @@ impl App {
         self.report.advance(ends_epoch);
     }
 
-    /// Fits a channel's model to the finished epoch, servicing everything else meanwhile, and sends it.
+    /// Fits a channel's model to the finished epoch, servicing everything else meanwhile, and sends the model.
     fn learn(&mut self, board: &mut impl Board, index: usize) {
         let Some(epoch) = self.state.learner.finished.take() else { return };
         let channel = EpochChannel { epoch, index, scale: epoch.scale(self.state.config) };
@@ -545,7 +547,7 @@ impl App {
         }
     }
 
-    /// All but reports and tables; false cancels the fit, after a reset of the statistics.
+    /// Services everything except reports and tables. False cancels the fit, after a reset of the statistics.
     fn service_during_fit(&mut self, board: &mut impl Board) -> bool {
         self.service(board);
         if self.flush(board) {
@@ -555,7 +557,7 @@ impl App {
     }
 }
 
-/// Kept settings, if any, and models (into `learner`).
+/// Reads stored settings, if any, and models (into `learner`).
 #[inline(never)]
 fn read_stored(board: &mut impl Board, learner: &mut Learner) -> Option<StoredSettings> {
     let mut record = [0; MAX_RECORD];

@@ -1,4 +1,4 @@
-//! Requests of a person at a bench (registers, bus and data-ready times, self-test), during which sampling pauses.
+//! Requests of a user at a bench (registers, bus and data-ready times, self-test), during which sampling pauses.
 
 use crate::answer::AnswerLine;
 use crate::board::{Board, FrameTimes};
@@ -22,7 +22,7 @@ pub(crate) fn register(name: &str) -> Option<Register> {
 /// A number of at most 16 bits in hexadecimal, with or without `0x`.
 pub(crate) fn hexadecimal(digits: &str) -> Option<u16> {
     let digits = digits.strip_prefix("0x").unwrap_or(digits);
-    // `from_str_radix` also takes a sign.
+    // `from_str_radix` would also accept a sign.
     digits.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| u16::from_str_radix(digits, 16).ok())?
 }
 
@@ -37,7 +37,7 @@ enum Request {
 const COMPARED_READS: usize = 10_000;
 const OVERLAPPING_READS: usize = 16;
 
-/// First value, number of other values, and the bits in which they differ.
+/// Returns the first value, the number of other values, and the bits in which they differ.
 fn compared<SPI: SpiDevice<u8>, D: DelayNs>(
     register: Register,
     sensor: &mut Adis16405<SPI, D>,
@@ -53,8 +53,8 @@ fn compared<SPI: SpiDevice<u8>, D: DelayNs>(
     Ok([first as i16, others, bits as i16, 0, 0, 0])
 }
 
-/// Asks the sensor while nothing is sampled, with timing for either power mode; many reads go as fast as configured.
-/// Returns a register's value, six deflections or [`compared`]; the error is to be printed.
+/// Asks the sensor while sampling is off, with timing for either power mode; many reads go as fast as configured.
+/// Returns a register's value, six deflections or [`compared`]; the error is text to be printed.
 #[allow(clippy::result_large_err, reason = "the text of an error is made where its type is known, and printed")]
 fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<[i16; 6], TextLine> {
     board.set_sampling(false);
@@ -107,7 +107,7 @@ pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut
 /// Bits of GLOB_CMD that write the sensor's flash (data sheet Rev. B, pages 10 and 13).
 const FLASH_COMMANDS: u16 = 1 << 0 | 1 << 1 | 1 << 3 | 1 << 4;
 
-/// True if this writes the sensor's flash, one of 10,000 cycles.
+/// True if this value writes the sensor's flash, one of 10,000 cycles.
 pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
     register == Register::GlobCmd && value & FLASH_COMMANDS != 0
 }
@@ -214,7 +214,7 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
         )));
     }
     let response = ask(Request::Deflections(stimulus), state, board);
-    // The filter holds displaced samples.
+    // The filter still contains samples of the deflected sensor.
     let now_us = board.now_us();
     board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
     AnswerLine::Text(match response {
@@ -223,10 +223,10 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
     })
 }
 
-/// Longest test with one stimulus, s: everything waits.
+/// Longest test with one stimulus, s; everything else waits for it.
 const LONGEST_TEST_S: f64 = 3.0;
 
-/// Test with one stimulus, s: two filter lengths and eight samples.
+/// Duration of the test with one stimulus, s: two filter lengths and eight samples.
 fn deflection_s(config: Config) -> f64 {
     let samples = (2 << config.filter_taps_log2()) + 8;
     2.0 * f64::from(samples) / config.sample_period().hz()

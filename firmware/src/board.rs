@@ -1,4 +1,4 @@
-//! The board as the main loop sees it.
+//! The interface of a board to the main loop.
 
 use crate::acquisition::SamplingActivity;
 use crate::receive::HostPort;
@@ -18,12 +18,12 @@ pub struct SelectTiming {
     pub read_ns: u32,
 }
 
-/// Minimum times of the sensor's bus, whatever the driver does.
+/// Minimum times of the sensor's bus; they hold whatever the driver does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BusTiming {
-    /// Between two frames in normal mode.
+    /// Times in normal mode.
     pub normal: SelectTiming,
-    /// With a serial clock of at most 300 kHz, for low-power mode.
+    /// Times in low-power mode, with a serial clock of at most 300 kHz.
     pub low_power: SelectTiming,
     /// Pause between two words of a burst in ns, each of which is then a DMA transfer; 0 for none.
     pub word_gap_ns: u32,
@@ -38,8 +38,8 @@ impl BusTiming {
         word_gap_ns: 0,
     };
 
-    /// For a sensor that fails with [`USUAL`](Self::USUAL): chip select high for 50 µs, and a frame's stall after every
-    /// word. A burst takes 0.45 ms at 656 kHz.
+    /// Times for a sensor that fails with [`USUAL`](Self::USUAL): chip select high for 50 µs, and a frame's stall after
+    /// every word. A burst takes 0.45 ms at 656 kHz.
     pub const SLOW: Self = Self {
         normal: SelectTiming { high_ns: 50_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 100_000, read_ns: 150_000 },
@@ -52,18 +52,18 @@ impl BusTiming {
 pub struct FrameTimes {
     /// Time for which chip select was low in the last frame.
     pub low_us: u32,
-    /// Shortest time for which it was high between two frames.
+    /// Shortest time for which chip select was high between two frames.
     pub shortest_high_us: u32,
     /// Shortest time from one falling edge of chip select to the next.
     pub shortest_period_us: u32,
 }
 
 impl FrameTimes {
-    /// Before the first frame.
+    /// The times before the first frame.
     pub const NONE: Self = Self { low_us: 0, shortest_high_us: u32::MAX, shortest_period_us: u32::MAX };
 }
 
-/// The application's view of a board: its microcontroller, or a virtual sensor on the host.
+/// The application's interface to a board: its microcontroller, or a virtual sensor on the host.
 pub trait Board {
     /// The sensor's bus, for registers.
     type Bus<'a>: SpiDevice<u8>
@@ -78,18 +78,18 @@ pub trait Board {
     fn now_us(&mut self) -> u64;
     /// Sleeps until the next interrupt.
     fn sleep(&mut self) {}
-    /// Bus and delay; only while sampling is disabled.
+    /// Bus and delay. May be called only while sampling is disabled.
     fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
     /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in
-    /// Hz. Only while sampling is disabled.
+    /// Hz. May be called only while sampling is disabled.
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
     /// Enables or disables sampling. Returns when no burst is being transferred and the stall time has passed.
     fn set_sampling(&mut self, enabled: bool);
     /// Transfers of bursts so far.
     fn sampling_activity(&mut self) -> SamplingActivity;
-    /// Resets the microcontroller's side of the bus; only while sampling is disabled.
+    /// Resets the microcontroller's side of the bus. May be called only while sampling is disabled.
     fn reset_bus(&mut self);
-    /// Sets other bus times; only while sampling is disabled.
+    /// Sets other bus times. May be called only while sampling is disabled.
     fn set_bus_timing(&mut self, timing: BusTiming);
     /// Frame times since the last call.
     fn frame_times(&mut self) -> FrameTimes;
@@ -99,13 +99,13 @@ pub trait Board {
     fn reset_sensor(&mut self) -> bool {
         false
     }
-    /// Gives access to the estimators, which wait: `access` must be short.
+    /// Gives access to the estimators, which wait meanwhile: `access` must be short.
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
     /// Gives access to the transmit queue, then starts transmission.
     fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R;
-    /// The next received byte, and the port that has received it.
+    /// The next received byte, and its port.
     fn receive(&mut self) -> Option<(HostPort, u8)>;
-    /// Load figures of the board since it started, and the bytes that its ports have lost; the others are 0.
+    /// Load figures of the board since it started, and the bytes that its ports have lost; all other counters are 0.
     fn health(&mut self) -> Health;
     /// Feeds the watchdog.
     fn feed_watchdog(&mut self);
@@ -115,7 +115,7 @@ pub trait Board {
     fn program_brown_out(&mut self) -> BrownOutLevel {
         BrownOutLevel::Fixed
     }
-    /// True if the board has memory that keeps a record without power.
+    /// True if the board has memory for a record that survives a loss of power.
     fn keeps_record(&mut self) -> bool {
         false
     }
@@ -123,11 +123,11 @@ pub trait Board {
     fn read_record(&mut self, _record: &mut [u8]) -> Option<usize> {
         None
     }
-    /// Replaces the record, or erases it if `record` is empty. Only while sampling is disabled: interrupts may be off
-    /// meanwhile.
+    /// Replaces the record, or erases it if `record` is empty. May be called only while sampling is disabled, since
+    /// interrupts may be off meanwhile.
     ///
     /// # Errors
-    /// The board has no such memory, or it does not take the record. The one before is kept.
+    /// The board has no such memory, or it does not take the record. The previous record is kept.
     fn write_record(&mut self, _record: &[u8]) -> Result<(), StoreError> {
         Err(StoreError::NoMemory)
     }
@@ -140,13 +140,13 @@ pub trait Board {
 /// Brown-out level after a request to program it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BrownOutLevel {
-    /// Set at every start, or cannot be set.
+    /// The level is set at every start, or cannot be set.
     Fixed,
-    /// Was programmed before.
+    /// The level had been programmed before.
     Set,
-    /// Was programmed now.
+    /// The level was programmed now.
     Programmed,
-    /// Could not be programmed.
+    /// The level could not be programmed.
     Failed,
 }
 
@@ -158,7 +158,7 @@ pub struct Uptime {
 }
 
 impl Uptime {
-    /// Time 0 at counter value `counter`.
+    /// The uptime that is 0 at counter value `counter`.
     #[must_use]
     pub const fn new(counter: u32) -> Self {
         Self { last: counter, total_us: 0 }

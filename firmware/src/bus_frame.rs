@@ -1,4 +1,4 @@
-//! Frames on the sensor's bus: chip select with its times, and the operations between.
+//! Frames on the sensor's bus: the timing of chip select, and the operations between its edges.
 
 use crate::board::{BusTiming, FrameTimes};
 use crate::sensor::LOW_POWER_LIMIT_HZ;
@@ -8,11 +8,11 @@ use embedded_hal::spi::{self, Operation};
 
 /// The microsecond counter of a microcontroller.
 pub trait MicrosecondCounter {
-    /// Its value, which wraps at 2³².
+    /// The counter's value, which wraps at 2³².
     fn counter() -> u32;
 }
 
-/// Why a register access over the bus has failed.
+/// The reason for which a register access over the bus failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusFault {
     /// The SPI peripheral did not transfer a byte in ten times the time that it takes.
@@ -33,12 +33,12 @@ impl spi::Error for BusFault {
 /// Readings of a flag before [`wait_for`] gives up: 0.4 ms at 168 MHz; a byte takes 49 µs at the slowest clock.
 const READINGS: u32 = 25_000;
 
-/// Waits for a flag; false after [`READINGS`] readings.
+/// Waits for a flag; false if it is not set after [`READINGS`] readings.
 pub(crate) fn wait_for(mut flag: impl FnMut() -> bool) -> bool {
     (0..READINGS).any(|_| flag())
 }
 
-/// Waits for at least `ns`, and a bounded time if the counter stands still.
+/// Waits for at least `ns`; the wait is bounded even if the counter stands still.
 pub(crate) fn wait_ns<M: MicrosecondCounter>(ns: u32) {
     if ns > 0 {
         let (start, us) = (M::counter(), ns.div_ceil(1000));
@@ -61,7 +61,7 @@ pub(crate) struct ChipSelect<S> {
     pin: S,
     pub(crate) timing: BusTiming,
     low_power: bool,
-    /// Counter at the last falling and rising edge.
+    /// Counter values at the last falling and rising edge.
     fallen_at: u32,
     risen_at: u32,
     times: FrameTimes,
@@ -80,7 +80,7 @@ impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
         let times = if self.low_power { self.timing.low_power } else { self.timing.normal };
         let now = M::counter();
         let rest_ns = |since: u32, least_ns: u32| {
-            // Differences of readings may be almost 1 µs too long.
+            // A difference of two readings may be almost 1 µs too long.
             let elapsed_us = now.wrapping_sub(since).saturating_sub(1);
             least_ns.saturating_sub(elapsed_us.saturating_mul(1000))
         };
@@ -105,7 +105,7 @@ impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
     }
 }
 
-/// Performs the operations of a frame; a frame of one delay wakes a sleeping sensor.
+/// Performs the operations of a frame. A frame with only a delay wakes a sleeping sensor.
 pub(crate) fn transfer<M: MicrosecondCounter, S: OutputPin<Error = Infallible>>(
     bytes: &mut impl ByteExchange,
     select: &mut ChipSelect<S>,
@@ -186,7 +186,7 @@ mod tests {
         }
     }
 
-    /// Each byte takes this many µs and is echoed.
+    /// A bus on which each byte takes this many µs and is echoed.
     struct Bytes(u32);
 
     impl ByteExchange for Bytes {
@@ -200,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Low time of chip select, and period of falling edges.
+    /// The low time of chip select and the period of its falling edges, for each frame.
     fn frames() -> Vec<(u32, u32)> {
         let edges = EDGES.take();
         let fallen: Vec<u32> = edges.iter().step_by(2).map(|&(at, _)| at).collect();
@@ -209,7 +209,7 @@ mod tests {
         edges.chunks(2).map(|pair| pair[1].0.wrapping_sub(pair[0].0)).zip([0].into_iter().chain(before)).collect()
     }
 
-    /// The waking pulse of 20 µs (data sheet Rev. B, Table 1) needs chip select low.
+    /// The waking pulse of 20 µs (data sheet Rev. B, Table 1) requires that chip select is low.
     #[test]
     fn a_delay_is_kept_while_chip_select_is_low() {
         let mut select = ChipSelect::new(Pin, BusTiming::USUAL);
@@ -222,7 +222,8 @@ mod tests {
         }
     }
 
-    /// 40 µs, or 150 µs in low-power mode (data sheet Rev. B, Table 2); a frame takes 8 µs at 2 MHz, 54 µs at 297 kHz.
+    /// The read rate is 40 µs, or 150 µs in low-power mode (data sheet Rev. B, Table 2); a frame takes 8 µs at 2 MHz,
+    /// 54 µs at 297 kHz.
     #[test]
     fn frames_keep_the_read_rate_at_every_serial_clock() {
         for (limit_hz, byte_us, least_us) in
@@ -237,7 +238,7 @@ mod tests {
                 assert_eq!(answer, [byte, 7]);
             }
             let frames = frames();
-            // Stall of 16 or 75 µs, and readings of the counter.
+            // The limit allows a stall of 16 or 75 µs and readings of the counter.
             let most_us = (least_us + 10).max(2 * byte_us + 85);
             for &(_, period_us) in &frames[1..] {
                 assert!((least_us..most_us).contains(&period_us), "{limit_hz} Hz: {frames:?}");

@@ -14,17 +14,17 @@ pub(crate) enum Command {
     Report,
     Version,
     ResetStatistics,
-    /// 1/1000 Hz.
+    /// Sample rate, 1/1000 Hz.
     Rate(u32),
     Range(GyroRange),
     /// Base-2 logarithm of the taps.
     Filter(u8),
-    /// s, 0 for no end.
+    /// Length of an epoch, s; 0 for no end.
     Epoch(u32),
-    /// s, 0 for none.
+    /// Time between reports, s; 0 for none.
     Interval(u32),
     RawStream(bool),
-    /// Accept this PROD_ID for an ADIS16405, 0 for none.
+    /// PROD_ID to accept for an ADIS16405; 0 for none.
     ProductId(u16),
     SelfTest,
     BrownOut,
@@ -53,7 +53,7 @@ enum Form {
     RegisterValue(fn(Register, u16) -> Command),
 }
 
-/// Usage (begins with the word), form, help, in the order of `?`; lines of 80 columns.
+/// Usage (begins with the command's word), form and help of each command, in the order of `?`; lines fit 80 columns.
 static COMMANDS: [(&str, Form, &str); 35] = {
     use Command as C;
     use Form::{Key, Number, RegisterValue, Thousandths, Title, Word};
@@ -134,10 +134,10 @@ pub(crate) enum CommandError {
     LostBytes,
 }
 
-/// Bytes.
+/// Longest line of a command, bytes.
 const MAX_LINE: usize = 32;
 
-/// Parses commands, which are whole lines, so that noise on an open input triggers none.
+/// Parses commands. A command is a whole line, so that noise on an open input triggers none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CommandParser {
     line: Vec<u8, MAX_LINE>,
@@ -198,7 +198,7 @@ fn whole_line(line: &[u8]) -> Option<Command> {
     COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage, form))?))
 }
 
-/// The beginning of a command of this usage: all of it where nothing follows.
+/// The command's word in a usage text: all of the text if no argument follows.
 fn word<'a>(usage: &'a str, form: &Form) -> &'a str {
     match form {
         Form::Word(_) => usage,
@@ -313,7 +313,7 @@ mod tests {
                 Ok(Command::WriteRegister(Register::GlobCmd, 0x0080)),
             ]
         );
-        // Except `t`, which acts at once.
+        // A word runs only as a whole line; `t` is a key and acts at once.
         assert_eq!(
             parse("xautonull\rclear\r"),
             [Err(CommandError::UnknownKey(b'x')), Ok(Command::Answer(Answer::Table)), Ok(Command::ResetStatistics),]
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_changes_nothing() {
+    fn noise_runs_no_command_that_needs_a_whole_line() {
         let mut parser = CommandParser::default();
         let mut state = 1_u64;
         for _ in 0..1_000_000 {

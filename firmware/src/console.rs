@@ -25,12 +25,12 @@ pub(crate) struct Console {
     answers: Deque<Answer, WAITING_ANSWERS>,
     /// Index of the next line of the first answer.
     next_line: usize,
-    /// Read once per answer: it searches the stack for a millisecond.
+    /// Counters, read once per answer: reading them searches the stack for a millisecond.
     counted: Health,
 }
 
 impl Console {
-    /// Sends a line behind the waiting ones; drops the oldest of too many.
+    /// Queues a line behind the waiting ones, and drops the oldest if there are too many.
     pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = text_line(text);
         if self.lines.is_empty() && board.transmit_queue(|queue| queue.send_text(&line)) {

@@ -3,7 +3,7 @@
 use crate::event::event;
 use link::{Counter, Health};
 
-/// Counters saturate.
+/// Adds to a counter, which saturates.
 pub(crate) fn add(counter: &mut u32, more: u32) {
     *counter = counter.saturating_add(more);
 }
@@ -32,7 +32,7 @@ impl CounterLog {
     }
 }
 
-/// Counters that have risen, also since a reset, and by how much.
+/// Event counters that have risen, also since a reset, with the increase.
 fn risen(before: &Health, now: &Health) -> impl Iterator<Item = (Counter, u32)> {
     let pairs = before.counters().into_iter().zip(now.counters());
     let risen = pairs.map(|(before, now)| (now, now.value.checked_sub(before.value).unwrap_or(now.value)));
@@ -47,7 +47,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn every_counter_of_events_is_told_when_it_rises() {
+    fn every_event_counter_is_reported_when_it_rises() {
         // Numbers 1, 2, 3, … in the wire format's order.
         let bytes: Vec<u8> = (1..=Health::COUNTERS as u8).collect();
         let health: Health = postcard::from_bytes(&bytes).expect("as many varints as there are counters");
@@ -59,7 +59,7 @@ mod tests {
         assert!(figures.iter().map(|counter| counter.name).eq(others), "{figures:?}");
         assert!(risen(&Health::default(), &health).eq(events.iter().map(|counter| (*counter, counter.value))));
         assert_eq!(risen(&health, &health).count(), 0);
-        // Reset and risen again.
+        // The counter was reset and has risen again.
         let again = Health { lost_edges: 3, ..Health::default() };
         assert!(risen(&health, &again).map(|(counter, more)| (counter.name, more)).eq([("lost_edges", 3)]));
     }

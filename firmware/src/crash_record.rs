@@ -6,7 +6,7 @@ use heapless::Vec;
 use link::{MAX_TEXT, TextLine, text_line};
 
 const TEXT_WORDS: usize = MAX_TEXT / 4;
-/// Independent of the build: the next image reads it.
+/// The key does not depend on the build: the next image reads the record.
 const KEY: u32 = 0xC4A5_4EC0;
 
 /// Length and bytes of a text that a warm reset keeps.
@@ -19,7 +19,7 @@ impl CrashRecord {
         Self(Slot::blank())
     }
 
-    /// Writes `text`, truncated to [`MAX_TEXT`] bytes, unless there is one: later crashes are not the cause.
+    /// Writes `text`, truncated to [`MAX_TEXT`] bytes, unless a text is there: a later crash is not the cause.
     pub fn write(&self, text: fmt::Arguments<'_>) {
         if self.0.read(KEY).is_none() {
             let line = text_line(text);
@@ -57,7 +57,7 @@ mod tests {
         assert_eq!(record.take(), "");
     }
 
-    /// A panic whose report overflows the stack.
+    /// The second text is from a panic whose report overflows the stack.
     #[test]
     fn the_first_crash_of_a_run_is_kept() {
         let record = CrashRecord::blank();

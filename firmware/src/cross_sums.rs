@@ -28,13 +28,13 @@ pub(crate) const PAIRS: [(usize, usize); 25] = {
 pub(crate) struct CrossSums {
     low: [[u64; PAIRS.len()]; CROSS_OCTAVES],
     high: [[i32; PAIRS.len()]; CROSS_OCTAVES],
-    /// Once in 32 samples at most.
+    /// Number of products; it rises once in 32 samples at most.
     counts: [[u32; PAIRS.len()]; CROSS_OCTAVES],
     totals: [i64; CHANNELS.len()],
-    /// Samples in any channel, and refused ones per channel.
+    /// Samples in any channel, and refused counts per channel.
     samples: u64,
     refused_counts: [u64; CHANNELS.len()],
-    /// Samples before a restart are missing.
+    /// True if samples before a restart are missing.
     pub(crate) incomplete: bool,
 }
 
@@ -52,7 +52,7 @@ impl CrossSums {
     }
 
     pub(crate) fn reset(&mut self) {
-        // In place: 5 kB would go over the stack.
+        // The arrays are filled in place: a new value would put 5 kB on the stack.
         self.low.fill([0; PAIRS.len()]);
         self.high.fill([0; PAIRS.len()]);
         self.counts.fill([0; PAIRS.len()]);
@@ -77,7 +77,7 @@ impl CrossSums {
         if !refused.is_empty() {
             self.subtract_refused(counts, refused);
         }
-        // All channels have the same time, and due octaves.
+        // All channels have the same time and the same due octaves.
         let due =
             (0..CHANNELS.len()).find(|&index| !refused.contains(index)).map(|index| estimators[index].octaves_due());
         for octave in FIRST_CROSS_OCTAVE..due.unwrap_or(0).min(FIRST_CROSS_OCTAVE + CROSS_OCTAVES) {
@@ -98,7 +98,7 @@ impl CrossSums {
     }
 
     fn add_products(&mut self, row: usize, differences: &[Option<i64>; CHANNELS.len()]) {
-        // No panic in the sampling path.
+        // `get_mut` avoids a panic in the sampling path.
         let (Some(low), Some(high)) = (self.low.get_mut(row), self.high.get_mut(row)) else { return };
         let Some(counts) = self.counts.get_mut(row) else { return };
         let difference = |of: usize| differences.get(of).copied().flatten();
@@ -124,11 +124,11 @@ pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 /// Rounded Allan covariances and means of a finished epoch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
-    /// By pair and octave, counts²; 0 if not observed, −0 for a covariance of 0.
+    /// Covariance by pair and octave, counts²; 0 if not observed, −0 for a covariance of 0.
     pub(crate) pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
     /// Mean of every channel; 0 without samples.
     pub means: ChannelMeans,
-    /// False after a restart in the epoch.
+    /// False if the device restarted in the epoch.
     pub complete: bool,
 }
 
@@ -137,7 +137,7 @@ impl AllanCovariances {
     pub const EMPTY: Self =
         Self { pairs: [[NOT_OBSERVED; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
 
-    /// In place: 2.5 kB.
+    /// Filled in place: it has 2.5 kB.
     pub(crate) fn fill(&mut self, sums: &CrossSums) {
         self.complete = !sums.incomplete;
         let samples = |index: usize| (sums.samples - sums.refused_counts[index]).max(1);
@@ -146,7 +146,7 @@ impl AllanCovariances {
             for (k, covariance) in covariances.iter_mut().enumerate() {
                 let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
                 let sum = wide(sums.low[k][pair], sums.high[k][pair]) as f64;
-                // Never −0.
+                // An observed sum of 0 is stored as −0, since +0 is [`NOT_OBSERVED`].
                 let sum = if sum == 0.0 { -0.0 } else { sum };
                 *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { NOT_OBSERVED };
             }
@@ -177,7 +177,7 @@ mod tests {
         (k % 1000) as i32
     }
 
-    /// `refused` gives the missing channels per sample.
+    /// Sums of `samples` samples; `refused` returns the missing channels of a sample.
     fn sums(samples: u32, refused: impl Fn(u32) -> ChannelSet) -> Box<CrossSums> {
         let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);
         let mut sums = Box::new(CrossSums::new());
@@ -195,14 +195,14 @@ mod tests {
         sums.counts[0][pair]
     }
 
-    /// Forty samples of gyro x from the 600th on, more than n = 256 bridges: other pairs lose nothing.
+    /// Gyro x loses forty samples from the 600th on, more than n = 256 bridges. Other pairs lose nothing.
     #[test]
     fn a_channel_without_a_sample_costs_its_own_pairs_only() {
         let complete = sums(4096, |_| ChannelSet::EMPTY);
         let gap = |k| if (600..640).contains(&k) { ChannelSet(1 << GYRO_X) } else { ChannelSet::EMPTY };
         let gapped = sums(4096, gap);
         let pair = (TEMPERATURE, SUPPLY);
-        // 512 samples for the first difference at n = 256, then every 32nd.
+        // The first difference at n = 256 takes 512 samples; further ones end every 32nd sample.
         assert_eq!(observed(&complete, pair.0, pair.1), (4096 - 512) / 32 + 1);
         assert_eq!(observed(&gapped, pair.0, pair.1), observed(&complete, pair.0, pair.1));
         assert!(observed(&gapped, GYRO_X, TEMPERATURE) < observed(&complete, GYRO_X, TEMPERATURE));
@@ -228,9 +228,9 @@ mod tests {
         assert_eq!(covariances.means[GYRO_X], 0.0);
     }
 
-    /// 0 differs from none.
+    /// A covariance of 0 differs from a missing one.
     #[test]
-    fn a_covariance_of_zero_is_one() {
+    fn a_covariance_of_zero_counts_as_observed() {
         let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);
         let mut sums = Box::new(CrossSums::new());
         for _ in 0..2048 {

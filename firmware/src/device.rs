@@ -22,7 +22,7 @@ pub const FIRST_CONFIG: Config = {
     config
 };
 
-/// First start: a report every ten seconds, an endless epoch.
+/// Settings at the first start: a report every ten seconds, an endless epoch.
 pub(crate) const FIRST_SETTINGS: UserSettings = UserSettings {
     smpl_prd: FIRST_CONFIG.sample_period().register(),
     sens_avg: FIRST_CONFIG.sens_avg(),
@@ -32,23 +32,23 @@ pub(crate) const FIRST_SETTINGS: UserSettings = UserSettings {
 };
 
 const RETRY_US: u64 = 1_000_000;
-/// Rest for a sensor that may have lost its supply: its longest start-up.
+/// Pause for a sensor that may have lost its supply: its longest start-up, µs.
 pub(crate) const START_UP_US: u64 = Timing::DEFAULT.start_up_us as u64;
 const LOG_FLUSH_US: u64 = 200_000;
 
 pub(crate) struct DeviceState {
-    /// In the hardware, Hz.
+    /// Serial clock as set in the hardware, Hz.
     pub(crate) spi_clock_hz: u32,
     pub(crate) boot: Boot,
     pub(crate) settings: RetainedSettings,
     pub(crate) config: Config,
-    /// 0 before an answer.
+    /// Product identification of the sensor; 0 before it has answered.
     pub(crate) product_id: u16,
     pub(crate) sensor: SensorState,
     pub(crate) learner: Learner,
-    /// µs since the start; negative if before.
+    /// Start of the epoch, µs since the start of the device; negative if before.
     pub(crate) epoch_start_us: i64,
-    /// Without sampling, estimating and load.
+    /// Counters of the application, without those of sampling, estimators and load.
     pub(crate) counters: Health,
     pub(crate) recovery: SensorRecovery,
     pub(crate) status_flags: StatusFlags,
@@ -58,9 +58,9 @@ pub(crate) struct DeviceState {
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorState {
-    /// To be probed at this time, as this step of recovery, or on request (`None`).
+    /// The sensor is to be probed at this time, as this step of recovery or, for `None`, on request.
     Probing { at_us: u64, step: Option<RecoveryStep> },
-    /// Sampled since this time.
+    /// The sensor has been sampled since this time.
     Sampled { since_us: u64 },
     /// The microcontroller is to be restarted at this time.
     Restarting { at_us: u64 },
@@ -96,7 +96,7 @@ impl DeviceState {
         board.estimators(|estimators| estimators.health()).with(&self.counters).with(&of_board)
     }
 
-    /// Probes when due, and stops using a sensor in trouble; true if the microcontroller is to be restarted.
+    /// Probes the sensor when due, and stops using one in trouble. True if the microcontroller is to be restarted.
     pub(crate) fn supervise_sensor(&mut self, board: &mut impl Board) -> bool {
         let now_us = board.now_us();
         match self.sensor {
@@ -109,7 +109,7 @@ impl DeviceState {
                     (estimators.monitor.has_period(), estimators.trouble(now_us), used, settled, flagged_us)
                 });
                 if !is_intact {
-                    // Ends the burst: a sensor cut off within one is late to answer.
+                    // The burst must end first: a sensor that is cut off within a burst answers late.
                     board.set_sampling(false);
                     panic!("memory is damaged: the sample period is 0");
                 }
@@ -127,7 +127,7 @@ impl DeviceState {
             }
             SensorState::Restarting { at_us } => {
                 if now_us >= at_us {
-                    // Reached only if the board does not restart.
+                    // This is reached only if the board does not restart.
                     self.request_probe(now_us);
                     return true;
                 }
@@ -136,7 +136,7 @@ impl DeviceState {
         false
     }
 
-    /// After a pause of the device's own: samples are lost, without suspicion.
+    /// Resumes sampling after a pause by the device: the lost samples do not make the sensor suspect.
     pub(crate) fn resume_sampling(&self, board: &mut impl Board) {
         if self.is_sampled() {
             let now_us = board.now_us();
@@ -157,7 +157,7 @@ impl DeviceState {
         board.set_sampling(false);
         let (reason, cause, left_alone_us) = match trouble {
             _ if board.sampling_activity().is_masked => ("the data-ready line oscillates and is masked", "", 0),
-            // It must not be clocked during a start-up.
+            // The sensor must not be clocked during its start-up.
             SensorTrouble::NoEdges => ("no data-ready edges", "", last_edge_us.unwrap_or(0) + START_UP_US),
             SensorTrouble::EdgeRate => ("silent, or edges at another rate", "", 0),
             SensorTrouble::Unusable(cause) => ("unusable bursts: ", cause, 0),
@@ -165,7 +165,7 @@ impl DeviceState {
         self.take_step(earliest_us.max(left_alone_us), board, format_args!("{reason}{cause}"));
     }
 
-    /// At `at_us` or now, whichever is later.
+    /// Schedules the next step for `at_us` or now, whichever is later.
     fn take_step(&mut self, at_us: u64, board: &mut impl Board, reason: Arguments<'_>) {
         let now_us = board.now_us();
         let step = self.recovery.ladder.next_step();
@@ -203,7 +203,7 @@ impl DeviceState {
                 scope = ProbeScope { pulse: true, reset: true, self_test: true };
             }
         }
-        // Perhaps in low-power mode.
+        // The sensor may be in low-power mode.
         let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.user.prod_id)
             .map_err(|error| text_line(format_args!("{error}")));
@@ -224,7 +224,7 @@ impl DeviceState {
         }
     }
 
-    /// Logs a probe, and marks failed channels.
+    /// Logs the result of a probe, and marks failed channels.
     fn report_identity(&mut self, identity: SensorIdentity, board: &mut impl Board) {
         let product = identity.product.prod_id();
         self.product_id = product;
@@ -265,8 +265,8 @@ impl DeviceState {
         Err(clock_hz)
     }
 
-    /// Reads and clears DIAG_STAT after an error flag, in the first half of the sample period from `edge_us` on, once a
-    /// second at most.
+    /// Reads and clears DIAG_STAT after an error flag: in the first half of the sample period from `edge_us` on, and at
+    /// most once a second.
     fn read_status(&mut self, edge_us: u64, board: &mut impl Board) {
         let now_us = board.now_us();
         let half_period_us = (5e5 / self.config.sample_period().hz()) as u64;

@@ -59,7 +59,7 @@ impl FinishedEpoch {
         self.sums.get(index)
     }
 
-    /// `None` if samples are missing in them, as after a restart.
+    /// The Allan covariances; `None` if samples are missing in them, as after a restart.
     #[must_use]
     pub fn covariances(&self) -> Option<&AllanCovariances> {
         self.covariances.complete.then_some(&self.covariances)
@@ -75,7 +75,7 @@ pub struct Regressor {
     pub value: f64,
     /// Standard error of the sensitivity: value ± 1.96·error holds 95 %.
     pub error: f64,
-    /// Covariate value of no correction, in its unit: the learned epoch's mean.
+    /// Value of the covariate at which the correction is 0, in its unit: the mean of the learned epoch.
     pub reference: f64,
 }
 
@@ -89,7 +89,7 @@ type Candidates = Vec<usize, MAX_COVARIATES>;
 pub struct EpochChannel<'e> {
     /// The epoch.
     pub epoch: &'e FinishedEpoch,
-    /// Its index in [`CHANNELS`].
+    /// Index of the channel in [`CHANNELS`].
     pub index: usize,
     /// The [scale](FinishedEpoch::scale) of the epoch.
     pub scale: ReportScale,
@@ -104,12 +104,12 @@ impl EpochChannel<'_> {
         self.scale.lsb(CHANNELS[self.index])
     }
 
-    /// The Allan variance curve in its unit.
+    /// The Allan variance curve in the channel's unit.
     pub(crate) fn curve(self) -> Curve<OCTAVES> {
         self.epoch.sums[self.index].curve(CHANNELS[self.index], self.scale)
     }
 
-    /// With another channel, in the product of both units.
+    /// Allan covariance with another channel, in the product of both units.
     fn covariance(self, other: usize, n: u64) -> Option<f64> {
         let covariance = self.epoch.covariances()?.covariance(self.index, other, n)?;
         Some(covariance * self.lsb() * self.other(other).lsb())
@@ -120,7 +120,8 @@ impl EpochChannel<'_> {
         self.other(with.map_or(self.index, |other| candidates[other])).covariance(candidates[covariate], n)
     }
 
-    /// A covariate at the octaves of the cross sums, its own noise modelled (estimate) or measured (subtraction).
+    /// A covariate at the octaves of the cross sums. Its own noise is modelled for an estimate, or taken as measured
+    /// for a subtraction.
     fn covariate(self, index: usize, modelled: bool) -> Covariate<CROSS_OCTAVES> {
         let covariate = self.other(index);
         if modelled {
@@ -130,7 +131,7 @@ impl EpochChannel<'_> {
         }
     }
 
-    /// Estimates significant sensitivities, none without [covariances](FinishedEpoch::covariances); `None` if `keep_on`,
+    /// Estimates significant sensitivities; there are none without [covariances](FinishedEpoch::covariances). `None` if `keep_on`, which is
     /// called before every fit, returned false.
     #[must_use]
     pub fn estimate_regressors(self, keep_on: &mut dyn FnMut() -> bool) -> Option<Regressors> {
@@ -142,7 +143,7 @@ impl EpochChannel<'_> {
             if !keep_on() {
                 return None;
             }
-            // There is room for all candidates.
+            // The list has room for all candidates.
             let _ = covariates.push(self.covariate(candidate, true));
         }
         let sensitivities = loop {
@@ -151,7 +152,7 @@ impl EpochChannel<'_> {
                 CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
             let sensitivities = regression.sensitivities_while(keep_on)?;
             let degrades = || self.degrades(&candidates, &sensitivities, &regression);
-            // By falling significance: the last is the weakest.
+            // Sensitivities are sorted by falling significance: the last is the weakest.
             let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
             candidates.remove(weakest.covariate);
             covariates.remove(weakest.covariate);
@@ -164,7 +165,7 @@ impl EpochChannel<'_> {
         Some(sensitivities.iter().map(with_reference).take(MAX_COVARIATES).collect())
     }
 
-    /// Compensates the channel's `curve` from 2⁸ samples on; `None`, and nothing is changed, without
+    /// Compensates the channel's `curve` from 2⁸ samples on; `None`, and no change, without
     /// [covariances](FinishedEpoch::covariances).
     pub(crate) fn compensate(self, curve: &mut Curve<OCTAVES>, regressors: &[Regressor]) -> Option<()> {
         if regressors.is_empty() {
@@ -184,7 +185,8 @@ impl EpochChannel<'_> {
         Some(())
     }
 
-    /// Change of the mean of stream and compensated stream since the epoch `before` (counts), in the channel's unit.
+    /// Change of the means of the stream and of the compensated stream since the means `before` (counts), in the
+    /// channel's unit.
     #[must_use]
     pub(crate) fn mean_shift(self, regressors: &[Regressor], before: &ChannelMeans) -> Option<ReportedShift> {
         let means = &self.epoch.covariances()?.means;
@@ -229,7 +231,7 @@ impl EpochChannel<'_> {
     }
 }
 
-/// Temperature and supply; accelerations for a gyro.
+/// The candidate covariates: temperature and supply, and for a gyro the accelerations.
 fn candidates(index: usize) -> impl Iterator<Item = usize> {
     let position = |channel: Channel| CHANNELS.iter().position(move |&other| other == channel);
     let environment = [Channel::Temp, Channel::Supply].into_iter();

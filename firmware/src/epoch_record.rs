@@ -1,4 +1,4 @@
-//! Words of a finished epoch in retained RAM: a restart while learning does not lose it.
+//! The words of a finished epoch in retained RAM, so that a restart while learning does not lose it.
 
 use crate::channels::{CHANNELS, OCTAVES};
 use crate::cross_sums::{CROSS_OCTAVES, PAIRS};
@@ -8,13 +8,15 @@ use crate::statistics::ChannelSums;
 use allan_core::Interpolation;
 
 const OCTAVE_WORDS: usize = 10;
-/// Samples, missing ones; per octave a sum of 96 and a count of 64 bits, and the bridged gaps.
+/// Words of one channel's sums: samples and missing ones, and per octave a sum of 96 bits, a count of 64 bits and the
+/// bridged gaps.
 pub(crate) const SUMS_WORDS: usize = 4 + OCTAVES * OCTAVE_WORDS;
-/// Number, completeness, rate, sums, means and pairs of 64 bits.
+/// Words of an epoch: number, completeness, rate, sums, and means and pairs of 64 bits each.
 pub(crate) const EPOCH_WORDS: usize =
     4 + CHANNELS.len() * SUMS_WORDS + 2 * (CHANNELS.len() + PAIRS.len() * CROSS_OCTAVES);
 
-/// Sums of squares stay below 2⁹⁴: differences within ±2¹⁴·n, 2⁴³/n of them in 2⁴⁰ samples.
+/// Visits the sums of a channel. Sums of squares stay below 2⁹⁴: differences within ±2¹⁴·n, 2⁴³/n of them in 2⁴⁰
+/// samples.
 pub(crate) fn visit_sums(sums: &mut ChannelSums, words: &mut Words<'_>) {
     words.wide(&mut sums.samples);
     words.wide(&mut sums.missing);

@@ -1,6 +1,6 @@
 //! Structured events for a debug probe.
 
-/// Logs as `defmt::$level!`; nothing on the host.
+/// Logs as `defmt::$level!` on the target; does nothing on the host.
 macro_rules! event {
     ($level:ident, $format:literal $(, $value:expr)*) => {{
         #[cfg(all(target_os = "none", feature = "microcontroller"))]

@@ -1,22 +1,23 @@
-//! The gate against gross errors, such as flipped bits: one in a million raises a gyro's variance by a fifth.
+//! The gate against gross errors, such as flipped bits. One error in a million samples raises a gyro's variance by a
+//! fifth.
 //!
-//! A sample is refused beyond seven times the rms difference from the last one used, unless it agrees with two refused
-//! ones (a step); after eight refusals only one in sixteen is. The first 32 samples are not used: the 28 smallest of 32
-//! squared normal numbers hold half of their sum (0.498).
+//! A sample is refused if it differs from the last used one by more than seven times the rms difference, unless it
+//! agrees with two refused ones (a step). After eight refusals only one sample in sixteen can be refused. The first 32
+//! samples are not used: the 28 smallest of 32 squared normal numbers hold half of their sum (0.498).
 
 use crate::channels::{CHANNELS, ChannelSet};
 
 pub(crate) const FIRST_BLOCK: u32 = 32;
-/// Samples between estimates; the sum of squares of 256 is their mean in 1/256 counts².
+/// Samples between estimates; a sum of 256 squares is their mean in 1/256 counts².
 const BLOCK: u32 = 256;
-/// Possible gross errors in the first block.
+/// Largest number of gross errors in the first block.
 const LEFT_OUT: usize = 4;
-/// Sum of squares over that without [`LEFT_OUT`], in a normal distribution.
+/// Ratio of a sum of squares to the sum without the largest [`LEFT_OUT`], in a normal distribution.
 const NORMAL_SHARE: u32 = 2;
 const WIDTH: u32 = 7;
-/// Rounding of two samples and of the limit, counts.
+/// Largest rounding of two samples and of the limit, counts.
 const ROUNDING: u32 = 3;
-/// Refused samples that agree before a step; one would let two damaged bursts in a row confirm each other.
+/// Refused samples that must agree with a step; with one, two consecutive damaged bursts would confirm each other.
 const AGREEING: u32 = 2;
 const SPACING: u64 = 16;
 const REFUSALS: u64 = 8;
@@ -26,38 +27,38 @@ struct ChannelGate {
     last: i32,
     limit: i32,
     sum: u32,
-    /// 1/256 counts².
+    /// Mean squared difference, 1/256 counts².
     noise: u32,
     /// Latest sample beyond the limit, and its number.
     beyond: (i32, u64),
     agreeing: u32,
     full_at: u64,
-    /// For the first block, the largest first, counts².
+    /// The largest squared differences of the first block, largest first, counts².
     left_out: [u32; LEFT_OUT],
 }
 
-/// The gates of all channels; other widths serve to measure false alarms.
+/// The gates of all channels. Other widths than [`WIDTH`] serve to measure false alarms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GrossErrorGate<const W: u32 = WIDTH> {
     channels: [ChannelGate; CHANNELS.len()],
     samples: u64,
-    /// Length and rest of the running block.
+    /// Length of the running block; `left` is its rest.
     block: u32,
     left: u32,
 }
 
 impl<const W: u32> GrossErrorGate<W> {
-    /// Knows no noise: it [learns](Self::is_learning) first.
+    /// A gate without a known noise: it [learns](Self::is_learning) first.
     pub(crate) fn new() -> Self {
         Self { channels: Default::default(), samples: 0, block: FIRST_BLOCK, left: FIRST_BLOCK }
     }
 
-    /// True in the first block, which is never refused.
+    /// True in the first block, whose samples are never refused.
     pub(crate) const fn is_learning(&self) -> bool {
         self.block == FIRST_BLOCK
     }
 
-    /// Takes the level of unused samples for the next comparison; restarts a first block.
+    /// Takes the level of unused samples for the next comparison, and restarts a first block.
     pub(crate) fn follow(&mut self, counts: &[i32; CHANNELS.len()]) {
         if self.is_learning() {
             *self = Self::new();
@@ -67,7 +68,7 @@ impl<const W: u32> GrossErrorGate<W> {
         }
     }
 
-    /// Gross errors, without those `refused` anyway.
+    /// The channels with a gross error, without those already `refused`.
     pub(crate) fn find(&mut self, counts: &[i32; CHANNELS.len()], refused: ChannelSet) -> ChannelSet {
         let mut gross = ChannelSet::EMPTY;
         self.samples += 1;
@@ -81,13 +82,13 @@ impl<const W: u32> GrossErrorGate<W> {
                 continue;
             }
             let difference = count - channel.last;
-            // Outside ±limit, in one comparison.
+            // One comparison finds differences outside ±limit.
             if (difference + channel.limit) as u32 > 2 * channel.limit as u32 {
                 gross.insert_if(index, channel.is_gross(count, self.samples));
                 continue;
             }
             channel.last = count;
-            // At most (2¹⁴)².
+            // A square is at most (2¹⁴)².
             channel.sum = channel.sum.saturating_add((difference * difference) as u32);
         }
         self.left -= 1;
@@ -97,7 +98,7 @@ impl<const W: u32> GrossErrorGate<W> {
         gross
     }
 
-    /// Not inlined: rare.
+    /// Learns from a sample. It is rare, and so not inlined.
     #[inline(never)]
     fn learn(&mut self, counts: &[i32; CHANNELS.len()]) {
         for (channel, &count) in self.channels.iter_mut().zip(counts) {
@@ -112,12 +113,12 @@ impl<const W: u32> GrossErrorGate<W> {
     #[inline(never)]
     fn end_block(&mut self) {
         let (is_first, is_known) = (self.is_learning(), self.block == BLOCK);
-        let to_mean = if is_first { NORMAL_SHARE } else { 1 } * (BLOCK / self.block.max(1)); // which cannot be 0
+        let to_mean = if is_first { NORMAL_SHARE } else { 1 } * (BLOCK / self.block.max(1)); // a block is never 0
         let width = if is_first { 2 * W } else { W };
         for channel in &mut self.channels {
             let newest = core::mem::take(&mut channel.sum).saturating_mul(to_mean);
             channel.noise = if is_known { channel.noise - channel.noise / 4 + newest / 4 } else { newest };
-            // In 1/16 counts.
+            // The root is in 1/16 counts.
             channel.limit = ((width * channel.noise.isqrt()).div_ceil(16) + ROUNDING) as i32;
         }
         self.block = (2 * self.block).min(BLOCK);
@@ -157,17 +158,17 @@ impl ChannelGate {
 
 #[cfg(test)]
 mod tests {
-    //! False alarms: 1,792 differences have ν = 1,195 in white noise, and Student's probability beyond ±7 is 4·10⁻¹²,
-    //! one sample of eight channels at 819.2 Hz in a year; filtered noise has ν ≥ 1,792/N. One start in 100,000 costs a
-    //! sample (ν = 43: 9·10⁻⁹). What passes: bit flips below the limit, larger errors that repeat, the ninth within 128
-    //! samples.
+    //! False alarms: 1,792 differences have ν = 1,195 in white noise, and Student's probability beyond ±7 is 4·10⁻¹².
+    //! This is one sample of eight channels at 819.2 Hz in a year; filtered noise has ν ≥ 1,792/N. One start in 100,000
+    //! loses a sample (ν = 43: 9·10⁻⁹). Not detected: bit flips below the limit, larger errors that repeat, and a ninth
+    //! error within 128 samples.
 
     extern crate std;
 
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Box and Muller, from a linear congruential generator (Knuth's MMIX).
+    /// Normal numbers by Box and Muller, from a linear congruential generator (Knuth's MMIX).
     struct Normal(u64);
 
     impl Normal {
@@ -191,7 +192,8 @@ mod tests {
         refused
     }
 
-    /// 6.7e-5 beyond four rms by Student's distribution; rounding takes up to 11 %; four standard deviations.
+    /// Student's distribution has 6.7e-5 beyond four rms. Rounding takes up to 11 %; the bounds are four standard
+    /// deviations.
     #[test]
     fn false_alarms_come_at_the_derived_rate() {
         let samples = 500_000;
@@ -201,7 +203,8 @@ mod tests {
         assert!((0.89 * expected - bound..expected + bound).contains(&found), "{found} of {expected}");
     }
 
-    /// The limit is twice as wide: 6.35e-4 over 300,000 simulated first blocks (NumPy); four standard deviations.
+    /// The limit is twice as wide. 300,000 simulated first blocks (NumPy) gave 6.35e-4; the bounds are four standard
+    /// deviations.
     #[test]
     fn false_alarms_after_a_start_come_at_the_derived_rate() {
         let (starts, mut normal, mut found) = (2000, Normal(4), 0);
@@ -244,12 +247,12 @@ mod tests {
         for k in 0..FIRST_BLOCK {
             gate.find(&noise(if k == 5 || k == 20 { 4096 } else { 0 }), ChannelSet::EMPTY);
         }
-        // 14 rms of 14 counts are 198, and 28 of 28.
+        // The limits are 14 rms: 198 counts for an rms of 14 counts, and twice that for 28.
         assert!(gate.channels.iter().all(|channel| (80..400).contains(&channel.limit)), "{gate:?}");
         assert_eq!(gate.find(&noise(512), ChannelSet::EMPTY), ChannelSet::ALL);
     }
 
-    /// For four million samples 2e-5 are expected, below one count too.
+    /// The expected number is 2e-5 in four million samples, also for noise below one count.
     #[test]
     fn no_sample_of_noise_is_refused() {
         for sigma in [0.1, 0.4, 3.0, 10.5, 300.0] {
@@ -273,7 +276,8 @@ mod tests {
         assert!((0..100).all(|_| find(1000.0) == ChannelSet::EMPTY));
     }
 
-    /// Turned by 100 deg/s at 1 Hz and shaken by 300 deg/s at 20 Hz: at most one in seventeen, none after five seconds.
+    /// The sensor turns by 100 deg/s at 1 Hz and shakes by 300 deg/s at 20 Hz: at most one sample in seventeen is
+    /// refused, none after five seconds.
     #[test]
     fn motion_costs_few_samples() {
         for (amplitude, frequency) in [(2000.0, 1.0), (6000.0, 20.0)] {

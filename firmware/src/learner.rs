@@ -1,4 +1,4 @@
-//! Learning: each inertial channel's model is fitted to an epoch and validated on the next.
+//! Learning: each inertial channel's model is fitted to one epoch and validated on the next.
 
 use crate::epoch::{EpochChannel, FinishedEpoch, Regressor, Regressors};
 use crate::report_messages::{model_error, reported_term};
@@ -18,17 +18,17 @@ use link::{
 };
 use serde::{Deserialize, Serialize};
 
-/// p-value of the residual above which no term is searched: the deviance of a dozen octaves is then below 14.
+/// p-value of the residual above which no further term is searched: a dozen octaves then have a deviance below 14.
 const P_VALUE_SUFFICIENT: f64 = 0.2;
 
 const _: () = assert!(MAX_ADDED == link::MAX_ADDED_TERMS);
-/// Most findings of a model beyond N, B and K.
+/// Largest number of findings of a model beyond N, B and K.
 pub(crate) const MAX_FINDINGS: usize = MAX_COVARIATES + MAX_ADDED;
 
-/// Coefficients of one channel; the device stores six of them.
+/// Coefficients of one channel; the device stores six of these models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpochModel {
-    /// `None` before the first fit.
+    /// The fitted N, B and K; `None` before the first fit.
     baseline: Option<BaselineCoefficients>,
     full: Vec<(NoiseTerm, f64), MAX_TERMS>,
     pub(crate) regressors: Regressors,
@@ -39,18 +39,18 @@ type BaselineCoefficients = [f64; NoiseTerm::BASELINE.len()];
 impl EpochModel {
     pub(crate) const EMPTY: Self = Self { baseline: None, full: Vec::new(), regressors: Vec::new() };
 
-    /// `None` before the first fit.
+    /// The model of N, B and K; `None` before the first fit.
     #[must_use]
     pub(crate) fn baseline(&self, scale: ReportScale) -> Option<Model> {
         Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), scale))
     }
 
-    /// Beyond N, B and K, with coefficients.
+    /// The terms beyond N, B and K, with their coefficients.
     pub(crate) fn added_terms(&self) -> impl Iterator<Item = (NoiseTerm, f64)> {
         self.full.iter().copied().filter(|(term, _)| !NoiseTerm::BASELINE.contains(term))
     }
 
-    /// `None` before the first fit.
+    /// The model with all terms; `None` before the first fit.
     #[must_use]
     fn full(&self, scale: ReportScale) -> Option<Model> {
         (!self.full.is_empty()).then(|| model(self.full.iter().copied(), scale))
@@ -89,13 +89,14 @@ pub struct EpochFit {
 }
 
 impl EpochFit {
-    /// With [regressors](EpochChannel::estimate_regressors), before its [run](Self::run).
+    /// A fit with these [regressors](EpochChannel::estimate_regressors), before its [run](Self::run).
     #[must_use]
     pub fn new(regressors: Regressors) -> Self {
         Self { baseline: None, regressors, trace: Trace::empty() }
     }
 
-    /// Fits the model of a channel to an epoch, for seconds; false if `keep_on`, called at every step, was.
+    /// Fits the model of a channel to an epoch, for some seconds. False if `keep_on`, which is called at every step,
+    /// returned false.
     #[must_use]
     pub fn run(&mut self, channel: EpochChannel<'_>, keep_on: &mut dyn FnMut() -> bool) -> bool {
         let done = self.search(channel, keep_on);
@@ -110,7 +111,7 @@ impl EpochFit {
     /// Traces further terms; false if cancelled.
     fn search(&mut self, channel: EpochChannel<'_>, keep_on: &mut dyn FnMut() -> bool) -> bool {
         let mut curve = channel.curve();
-        // Without covariances it is the stream's own curve.
+        // Without covariances the curve is that of the stream itself.
         let _ = channel.compensate(&mut curve, &self.regressors);
         self.trace.fit_baseline(&curve);
         let sufficient = self.trace.before_goodness.p_value > P_VALUE_SUFFICIENT;
@@ -124,7 +125,7 @@ impl EpochFit {
         EpochModel { baseline: self.baseline, full, regressors: self.regressors.clone() }
     }
 
-    /// The message on the fit of [`CHANNELS`]`[index]` to the epoch with the number `epoch`.
+    /// The message about the fit of [`CHANNELS`]`[index]` to the epoch with the number `epoch`.
     #[must_use]
     pub fn message(&self, index: usize, epoch: u32) -> LearnedMessage {
         let Self { regressors, trace, .. } = self;
@@ -159,7 +160,7 @@ pub fn validate(
     Some(message)
 }
 
-/// Error of the full model, and both streams' Allan deviations.
+/// Sets the error of the full model, and the Allan deviations of both streams.
 fn fill_compensated(model: &EpochModel, channel: EpochChannel<'_>, message: &mut ValidationMessage) -> Option<()> {
     let mut curve = channel.curve();
     let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE).take(MAX_DEVIATIONS);
@@ -196,16 +197,17 @@ fn reported_added_term(found: &AddedTerm, model: &Model) -> ReportedAddedTerm {
 }
 
 pub(crate) struct Learner {
-    /// `None` during a fit.
+    /// The finished epoch; `None` during a fit.
     pub(crate) finished: Option<&'static mut FinishedEpoch>,
     pub(crate) models: [EpochModel; INERTIAL],
     means: Option<ChannelMeans>,
-    /// Per point on the finished epoch: N, B and K on the stream, full model on the compensated stream.
+    /// Deviances per point on the finished epoch: of N, B and K on the stream, and of the full model on the compensated
+    /// stream.
     pub(crate) errors: [Option<(f64, f64)>; INERTIAL],
 }
 
 impl Learner {
-    /// Without models; `finished` is memory for epochs.
+    /// A learner without models; `finished` is the memory for epochs.
     pub(crate) fn new(finished: &'static mut FinishedEpoch) -> Self {
         Self {
             finished: Some(finished),
@@ -221,7 +223,7 @@ impl Learner {
         self.means = None;
     }
 
-    /// `None` during a fit.
+    /// The finished epoch; `None` during a fit.
     pub(crate) fn finished(&self) -> Option<&FinishedEpoch> {
         self.finished.as_deref()
     }

@@ -1,5 +1,5 @@
-//! The application that characterises an ADIS16405 while it is sampled: the same code in the images of all boards and
-//! on the host.
+//! The application that characterises an ADIS16405 while sampling it; the same code runs in the images of all boards
+//! and on the host.
 //!
 //! ```text
 //! data-ready edge ─► Sampler ─► burst queue ─► Estimators ─► App ─► transmit queue ─► serial port
@@ -8,7 +8,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `board`, `microcontroller` | what the application needs of a board; what the images of all boards share |
+//! | `board`, `microcontroller` | the interface of a board to the application; code that the images of all boards share
+//! |
 //! | `bus_frame` | frames on the sensor's bus: times of chip select, operations |
 //! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
 //! | [`sensor`] | serial clock, probing, auto-null |
@@ -19,16 +20,16 @@
 //! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
 //! | `device` | state of the device, supervision of the sensor |
-//! | `recovery`, `status_flags` | steps by which a sensor in trouble is recovered; what its status register has shown |
+//! | `recovery`, `status_flags` | steps that recover a sensor in trouble; counts of the causes in its status register |
 //! | `watchdog` | proof that every task is alive and the clock runs, for the watchdog |
 //! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
-//! | `report_text`, [`number_text`] | the report as a table that people read; numbers in it |
+//! | `report_text`, [`number_text`] | the report as a table for people; numbers in it |
 //! | [`console`], `answer`, `bench_console` | answers in text; registers, bus times and deflections for a bench |
-//! | `event`, `counters` | what a debug probe reads: events, and counters that have risen |
+//! | `event`, `counters` | output for a debug probe: events, and counters that have risen |
 //! | `transmit`, `receive`, [`usb_port`] | the queues to and from the serial ports, raw stream; the USB port |
 //! | [`command`], `app` | commands, main loop |
-//! | [`retained`], `slot`, `epoch_record`, `crash_record` | what survives a warm reset |
-//! | `stored_state`, [`settings_store`] | what survives the loss of power, and the flash memory that keeps it |
+//! | [`retained`], `slot`, `epoch_record`, `crash_record` | state that a warm reset keeps |
+//! | `stored_state`, [`settings_store`] | state that survives a loss of power, and its flash memory |
 //!
 //! Sampling has priority over the estimators, and these over the main loop. Interrupts that share a locked resource
 //! wait; locks are short.

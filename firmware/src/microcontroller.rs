@@ -47,9 +47,9 @@ pub struct UsbParts<U> {
 }
 
 impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
-    /// Starts the port of a product, with the board's number (at most twelve bytes) in hexadecimal.
-    /// `reconnect` resets the controller off the bus (false) and starts it again (true). Once; `None` afterwards, or
-    /// with too few endpoints.
+    /// Starts the port of a product, with the board's number (at most twelve bytes) in hexadecimal. `reconnect` takes
+    /// the controller off the bus (false) or starts it again (true). `None` after the first call, or with too few
+    /// endpoints.
     pub fn start(
         bus: &'static UsbBusAllocator<B>,
         product: UsbVidPid,
@@ -69,7 +69,7 @@ impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
 }
 
 impl<U> UsbParts<U> {
-    /// Port and queues of a board that has them.
+    /// The port and the queues of a board that has them.
     #[must_use]
     pub fn split(parts: Option<Self>) -> (Option<U>, Option<Producer<'static, u8>>, Option<Consumer<'static, u8>>) {
         parts.map_or((None, None, None), |Self { port, transmit, receive }| (Some(port), Some(transmit), Some(receive)))
@@ -83,7 +83,7 @@ impl ServedPort for Infallible {
     }
 }
 
-/// A board: its microcontroller, what is connected to which of its pins, and how it starts.
+/// A board: its microcontroller, the pins to which parts are connected, and its start.
 pub trait BoardSupport: Sized {
     /// The peripherals of the microcontroller.
     type Device;
@@ -93,7 +93,7 @@ pub trait BoardSupport: Sized {
     type DataReady: DataReadyPin;
     /// SPI of the sensor.
     type Spi: SpiPeripheral;
-    /// Its chip select.
+    /// Chip select of the sensor.
     type Select: OutputPin<Error = Infallible>;
     /// The serial port to the host on pins.
     type Uart: ServedPort;
@@ -111,7 +111,7 @@ pub type OutputOf<B> = <<B as BoardSupport>::Microcontroller as Microcontroller>
 
 /// The parts of a board after its start.
 pub struct BoardParts<B: BoardSupport> {
-    /// Why the microcontroller started.
+    /// Reason for which the microcontroller started.
     pub cause: BootCause,
     /// The source of the clocks.
     pub clock: ClockSource,
@@ -127,13 +127,13 @@ pub struct BoardParts<B: BoardSupport> {
     pub usb: Option<UsbParts<UsbOf<B>>>,
     /// The LED.
     pub led: OutputOf<B>,
-    /// The pin at RST of the sensor, if connected; high, low for a reset.
+    /// The pin at RST of the sensor, if connected: high, and low for a reset.
     pub reset_line: Option<OutputOf<B>>,
 }
 
 /// Clock, watchdog and restart of a microcontroller.
 pub trait Microcontroller: Watchdog {
-    /// The flash memory, of which the memory map leaves a part for the settings.
+    /// The flash memory; the memory map leaves a part of it for the settings.
     type Flash: FlashMemory;
     /// An output pin of any number.
     type Output: OutputPin;
@@ -148,8 +148,8 @@ pub trait Microcontroller: Watchdog {
     }
     /// Starts the boot loader that takes an image over USB.
     fn start_boot_loader() -> !;
-    /// To be called [`processor::WAKE_HZ`] times a second: prolongs a watchdog that is shorter than a step of the main
-    /// loop.
+    /// Feeds a watchdog that is shorter than a step of the main loop. To be called [`processor::WAKE_HZ`] times a
+    /// second.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
 }
 
@@ -157,7 +157,7 @@ pub trait Microcontroller: Watchdog {
 pub trait DataReadyPin {
     /// Clears the pending interrupt.
     fn clear(&mut self);
-    /// Masks edges, or takes them again without those in between.
+    /// Masks edges, or accepts them again; edges in between are lost.
     fn set_masked(&mut self, masked: bool);
     /// The level of the line.
     fn is_active(&mut self) -> bool;

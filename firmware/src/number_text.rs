@@ -2,15 +2,16 @@
 
 use core::fmt::{self, Display, Formatter};
 
-/// Values from this one on are not written out.
+/// Values from this one on are not written.
 const TOO_LARGE: f64 = 1e15;
 const MOST_DECIMALS: i32 = 12;
 
-/// Widest relative half-width of `+- half`, and largest ratio of both sides, as on the host.
+/// Largest relative half-width, and largest ratio of both sides, of an interval that is written `+- half`; as on the
+/// host.
 const SYMMETRIC: f64 = 0.25;
 const SKEW: f64 = 1.3;
 
-/// Between -22 and 22: exact or one rounding off.
+/// A power of ten between -22 and 22, exact or one rounding off.
 fn power_of_ten(exponent: i32) -> f64 {
     let power = (0..exponent.unsigned_abs()).fold(1.0, |power, _| power * 10.0);
     if exponent < 0 { 1.0 / power } else { power }
@@ -28,7 +29,8 @@ fn exponent(mut value: f64) -> i32 {
     exponent
 }
 
-/// So many decimals, half up, commas between thousands; `-` if not finite or at least 10^15.
+/// A number with `decimals` decimals, rounded half up, with commas between thousands; `-` if not finite or at least
+/// 10^15.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimal {
     value: f64,
@@ -36,7 +38,7 @@ pub struct Decimal {
 }
 
 impl Decimal {
-    /// With so many significant digits: `0.0368`, `2.43`, `1,200`.
+    /// The number with `digits` significant digits: `0.0368`, `2.43`, `1,200`.
     #[must_use]
     pub fn significant(value: f64, digits: i32) -> Self {
         let magnitude = libm::fabs(value);
@@ -44,12 +46,12 @@ impl Decimal {
             return Self { value, decimals: 0 };
         }
         let place = exponent(magnitude) - digits + 1;
-        // 9.96 in two digits is 10.
+        // The value is rounded first: 9.96 in two digits is 10.
         let carried = magnitude + power_of_ten(place) / 2.0;
         Self::at_place(value, exponent(carried) - digits + 1)
     }
 
-    /// Multiple of ten to the power `place`.
+    /// The value as a multiple of ten to the power `place`.
     fn at_place(value: f64, place: i32) -> Self {
         if place <= 0 {
             return Self { value, decimals: (-place).min(MOST_DECIMALS) };
@@ -97,7 +99,7 @@ impl Display for Count {
     }
 }
 
-/// Estimate with 95 % bounds: `2.43 +- 0.04`, `24 (14 .. 37)`, `< 190` for an upper bound alone.
+/// An estimate with 95 % bounds: `2.43 +- 0.04`, `24 (14 .. 37)`, or `< 190` if only the upper bound is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Best value.
@@ -119,7 +121,7 @@ impl Display for Estimate {
         let (below, above) = (value - low, high - value);
         let (half, wider, narrower) = ((high - low) / 2.0, below.max(above), below.min(above));
         if wider <= SKEW * narrower && half <= SYMMETRIC * libm::fabs(value) {
-            // Two digits if it begins with 1 or 2.
+            // An uncertainty that begins with 1 or 2 has two digits.
             let leading = exponent(half);
             let place = if half / power_of_ten(leading) < 2.95 { leading - 1 } else { leading };
             return write!(f, "{} +- {}", Decimal::at_place(value, place), Decimal::at_place(half, place));
@@ -139,7 +141,7 @@ mod tests {
     use std::format;
     use std::string::ToString;
 
-    /// `core` rounds the exact value, this a product: no ties.
+    /// `core` rounds the exact value, and this module a product: none of the values is a tie.
     #[test]
     fn decimals_equal_the_standard_formatting() {
         let mut value = 1.234_56e-9;
@@ -147,7 +149,7 @@ mod tests {
             for decimals in 0..=9 {
                 let text = Decimal { value, decimals }.to_string().replace(',', "");
                 let expected = format!("{value:.*}", decimals as usize);
-                // Exact to 10⁻⁵ of the last digit.
+                // The product is exact to 10⁻⁵ of the last digit.
                 if value * power_of_ten(decimals) < 1e11 {
                     assert_eq!(text, expected, "{value} to {decimals} decimals");
                     assert_eq!(
@@ -160,7 +162,7 @@ mod tests {
                 let shown: f64 =
                     Decimal::significant(value, digits).to_string().replace(',', "").parse().expect("a number");
                 let expected: f64 = format!("{value:.*e}", digits as usize - 1).parse().expect("a number");
-                // Below the last decimal written.
+                // Half of the last decimal that is written.
                 let limit = 0.5 * power_of_ten(-MOST_DECIMALS);
                 assert!((shown - expected).abs() <= 1e-14 * expected + limit, "{value} in {digits} digits: {shown}");
             }

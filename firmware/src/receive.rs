@@ -5,13 +5,13 @@ use heapless::spsc;
 /// The bytes from a serial port to the application.
 pub type ReceiveBuffer = spsc::Queue<u8, 256>;
 
-/// Stands for lost bytes (ASCII cancel): the line is no command.
+/// Marks lost bytes in the queue (ASCII cancel), so that their line is not a command.
 pub(crate) const LOST: u8 = 0x18;
 
 /// A serial port's end of the queue of received bytes.
 pub struct Receiver<'q> {
     queue: spsc::Producer<'q, u8>,
-    /// Without room in the queue to say so.
+    /// True if bytes were lost and the queue had no room for the mark.
     has_lost: bool,
 }
 
@@ -21,7 +21,7 @@ impl<'q> Receiver<'q> {
         Self { queue, has_lost: false }
     }
 
-    /// Queues a byte, or marks a lost one; returns how many bytes were lost.
+    /// Queues a byte, or for `None` marks a lost one; returns how many bytes were lost.
     pub fn push(&mut self, byte: Option<u8>) -> u32 {
         self.has_lost |= byte.is_none();
         if self.has_lost && self.queue.enqueue(LOST).is_ok() {
@@ -35,16 +35,16 @@ impl<'q> Receiver<'q> {
 
 /// A serial port to the host, served in its interrupt.
 pub trait ServedPort {
-    /// Moves bytes as far as possible at `now_us`, µs; returns how many received ones were lost.
+    /// Moves as many bytes as possible at `now_us`, µs; returns how many received ones were lost.
     fn serve(&mut self, now_us: u32) -> u32;
 }
 
 /// A serial port to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostPort {
-    /// On pins of the board.
+    /// The port on pins of the board.
     Uart,
-    /// On its USB connector.
+    /// The port on the USB connector.
     Usb,
 }
 
@@ -55,9 +55,9 @@ impl HostPort {
 
 /// The application's ends of the queues.
 pub struct ReceivedBytes<'q> {
-    /// From the UART.
+    /// Bytes from the UART.
     pub uart: spsc::Consumer<'q, u8>,
-    /// From the USB port of a board that has one.
+    /// Bytes from the USB port of a board that has one.
     pub usb: Option<spsc::Consumer<'q, u8>>,
 }
 
@@ -77,7 +77,7 @@ mod tests {
     use crate::command::{Command, CommandParser};
     use std::vec::Vec;
 
-    /// `e 3600` would become `e 36` or `e 36boot`.
+    /// With lost bytes, `e 3600` would become `e 36` or `e 36boot`.
     #[test]
     fn a_line_that_has_lost_bytes_is_no_command() {
         for lost in [1, 2, 4] {

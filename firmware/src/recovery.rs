@@ -1,21 +1,21 @@
 //! Recovery steps of a sensor in trouble, up to a restart of the microcontroller.
 
-/// Failed steps, once a second, before a restart.
+/// Failed steps, at one step a second, before the microcontroller is restarted.
 pub(crate) const FAILURES_BEFORE_RESTART: u32 = 30;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum RecoveryStep {
-    /// Identity and configuration.
+    /// Read identity and configuration again.
     Reread,
     /// Reset the SPI, end an open frame by a pulse, then probe.
     BusReset,
-    /// With longer bus times from then on: [`BusTiming::SLOW`](crate::BusTiming::SLOW).
+    /// Use longer bus times from then on: [`BusTiming::SLOW`](crate::BusTiming::SLOW).
     SlowBus,
     SoftwareReset,
-    /// By RST if connected, else by command; then probe.
+    /// Reset the sensor by RST if connected, else by command; then probe.
     ResetLine,
-    /// For the microcontroller; statistics are kept.
+    /// Restart the microcontroller; statistics are kept.
     Restart,
 }
 
@@ -32,11 +32,11 @@ impl RecoveryStep {
     }
 }
 
-/// Chooses the steps. Starts anew only after the sensor has [settled](Self::settle), not after each probe.
+/// Chooses the steps. It starts again only after the sensor has [settled](Self::settle), not after each probe.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RecoveryLadder {
     taken: u32,
-    /// Since the last restart: an absent sensor causes one at most.
+    /// True if the sensor has settled since the last restart: an absent sensor causes one restart at most.
     has_settled: bool,
 }
 
@@ -56,12 +56,12 @@ impl RecoveryLadder {
         }
     }
 
-    /// Enough usable bursts since the latest step.
+    /// To be called after enough usable bursts since the latest step.
     pub(crate) fn settle(&mut self) {
         *self = Self { taken: 0, has_settled: true };
     }
 
-    /// The first eight, then one of 32.
+    /// True for the first eight steps, then for one of 32.
     pub(crate) const fn is_logged(&self) -> bool {
         self.taken <= 8 || self.taken.is_multiple_of(32)
     }
@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(ladder.next_step(), Reread);
     }
 
-    /// After 30 failures, once per loss, never for a sensor absent from the start.
+    /// The restart comes after 30 failures, once per loss, and never for a sensor that was absent from the start.
     #[test]
     fn the_microcontroller_is_restarted_once() {
         let mut ladder = RecoveryLadder::default();

@@ -14,7 +14,7 @@ const VERSION: (u8, u8, u8) = (
     decimal(env!("CARGO_PKG_VERSION_PATCH")),
 );
 
-/// Above 255 fails the compilation.
+/// Parses a number; one above 255 fails the compilation.
 const fn decimal(digits: &str) -> u8 {
     match u8::from_str_radix(digits, 10) {
         Ok(number) => number,
@@ -23,7 +23,7 @@ const fn decimal(digits: &str) -> u8 {
 }
 
 impl DeviceState {
-    /// Device and settings; fixes the measured rate of the whole report.
+    /// The message of device and settings; it sets the measured rate of the whole report.
     fn hello(&mut self, ends_epoch: bool, board: &mut impl Board) -> Hello {
         let finished = self.learner.finished().filter(|_| ends_epoch);
         let (number, finished_hz) =
@@ -92,7 +92,7 @@ pub(crate) fn running_sums(board: &mut impl Board, index: usize) -> ChannelSums 
     board.estimators(|estimators| estimators.channel(index).map_or(ChannelSums::EMPTY, ChannelSums::from_estimator))
 }
 
-/// Queues a message; without room it is dropped and counted as missing.
+/// Queues a message. Without room the message is dropped and counted as missing.
 pub(crate) fn send(board: &mut impl Board, message: MessageRef<'_>) {
     board.transmit_queue(|queue| queue.send(message));
 }
@@ -108,14 +108,14 @@ pub(crate) enum ReportPart {
 
 #[derive(Default)]
 pub(crate) struct ReportProgress {
-    /// `None` without a report.
+    /// Index of the next message; `None` without a report.
     next: Option<usize>,
-    /// With the finished epoch's sums.
+    /// True if the report is on the sums of the finished epoch.
     ends_epoch: bool,
 }
 
 impl ReportProgress {
-    /// Reports the running epoch; no effect during a report.
+    /// Starts a report of the running epoch; has no effect during a report.
     pub(crate) fn start(&mut self) {
         self.next.get_or_insert(0);
     }
@@ -132,7 +132,7 @@ impl ReportProgress {
         self.ends_epoch
     }
 
-    /// `None` without a report, or at its end.
+    /// The next part; `None` without a report, or at its end.
     pub(crate) fn part(&mut self) -> Option<ReportPart> {
         let learners = if self.ends_epoch { INERTIAL } else { 0 };
         let channels = 1 + CHANNELS.len();
@@ -149,7 +149,8 @@ impl ReportProgress {
         })
     }
 
-    /// Advances unless the report was replaced meanwhile: `ended_epoch` is the message's kind of report.
+    /// Advances unless the report was replaced meanwhile; `ended_epoch` tells which kind of report the message belongs
+    /// to.
     pub(crate) fn advance(&mut self, ended_epoch: bool) {
         if self.ends_epoch == ended_epoch {
             self.next = self.next.map(|next| next + 1);

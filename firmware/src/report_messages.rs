@@ -1,4 +1,4 @@
-//! Report messages of one channel's sums, and a model's error.
+//! Report messages: the sums of one channel, and a model's error.
 
 use crate::channels::{ChannelEstimator, OCTAVES};
 use crate::statistics::ChannelSums;
@@ -8,7 +8,7 @@ use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
 
 impl ChannelSums {
-    /// The report on one channel, without losses; `unseen_error` is that of the previous epoch's model.
+    /// The report on one channel, without losses; `unseen_error` is the error of the previous epoch's model.
     #[must_use]
     pub fn report(
         &self,
@@ -45,7 +45,7 @@ impl ChannelSums {
     }
 }
 
-/// `None` without comparable octaves.
+/// Error of a model on a curve; `None` without comparable octaves.
 pub(crate) fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> Option<ReportedModelError> {
     let error = allan_core::model::Discrepancy::between(model, curve)?;
     Some(ReportedModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent })
@@ -58,7 +58,7 @@ pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
         NoiseTerm::BiasInstability => ReportedTerm::BiasInstability,
         NoiseTerm::RateRandomWalk => ReportedTerm::RateRandomWalk,
         NoiseTerm::RateRamp => ReportedTerm::RateRamp,
-        // No candidate is a second-order low-pass.
+        // The search has no candidate with a second-order low-pass.
         NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_) => ReportedTerm::Filtered,
         NoiseTerm::Markov(_) => ReportedTerm::Markov,
         NoiseTerm::Resonance(_) => ReportedTerm::Resonance,

@@ -40,7 +40,7 @@ pub(crate) fn line<B: Board>(state: &DeviceState, board: &mut B, mut index: usiz
 
 const BOUNDS: &str = "95 % bounds by octaves: 2 to 9 % wider than those of all samples, on a host.";
 
-/// 8, 20, 19, 19 and 13 columns.
+/// A row of 8, 20, 19, 19 and 13 columns.
 fn row([label, n, b, k, error]: [&str; 5]) -> TextLine {
     let line = text_line(format_args!(" {label:<7}{n:<20}{b:<19}{k:<19}{error:>13}"));
     text_line(format_args!("{}", line.trim_end()))
@@ -71,10 +71,10 @@ fn record(state: &DeviceState, board: &mut impl Board) -> TextLine {
     }
 }
 
-/// N, B and K with bounds, and the last model's error; marks a failed self-test.
+/// The row of a channel: N, B and K with bounds, and the last model's error; marks a failed self-test.
 fn coefficients(state: &DeviceState, board: &mut impl Board, index: usize) -> TextLine {
     let channel = CHANNELS[index];
-    // From deg/s and g to the table's units.
+    // Factors from deg/s and g to the table's units.
     let factors = if index < GYROS { [1.0, 1e3, 1e3] } else { [1e6; 3] };
     let scale = board.estimators(|estimators| estimators.scale());
     let model = running_sums(board, index).fit_baseline(channel, scale);
@@ -98,7 +98,7 @@ fn axis(index: usize) -> &'static str {
     ["x", "y", "z"][index % GYROS]
 }
 
-/// `gyro x temperature 0.048 +- 0.007 deg/s/degC`.
+/// A line such as `gyro x temperature 0.048 +- 0.007 deg/s/degC`; `None` beyond the last finding.
 fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
     let (channel, number) = (index / MAX_FINDINGS, index % MAX_FINDINGS);
     let (model, unit) = (models.get(channel)?, CHANNELS[channel].unit());
@@ -121,7 +121,7 @@ fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
         NoiseTerm::Markov(noise) => text_line(format_args!("Gauss-Markov, {} s", three(noise.time_constant))),
         NoiseTerm::Quantization => text_line(format_args!("quantization")),
         NoiseTerm::RateRamp => text_line(format_args!("rate ramp")),
-        // Baseline, and one that is not traced.
+        // These terms are part of the baseline, or are not traced.
         NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk | NoiseTerm::LowPass(_) => {
             return None;
         }
@@ -135,7 +135,7 @@ fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
     Some(text_line(format_args!("{label:<9}{name:<32}{} {unit}{per}", three(value))))
 }
 
-/// Title, head, Allan deviations by octave; `None` without values.
+/// A line of the table of Allan deviations: title, head, octaves; `None` without values.
 fn curve(board: &mut impl Board, line: usize) -> Option<TextLine> {
     match line {
         0 => Some(text_line(format_args!("Allan deviation, gyros in deg/s, accelerometers in mg"))),
@@ -148,7 +148,7 @@ fn octave_cells(tau: &str, [a, b, c, d, e, f]: [&str; INERTIAL]) -> TextLine {
     text_line(format_args!("{tau:>9}{a:>11}{b:>11}{c:>11}{d:>11}{e:>11}{f:>11}"))
 }
 
-/// `None` without values.
+/// The row of an octave; `None` without values.
 fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
     let scale = estimators.scale();
     let n = (1_u64 << octave.min(OCTAVES)) as f64;

@@ -1,6 +1,6 @@
-//! Retained RAM: statistics and settings through a warm reset, with checksums over content, build and settings.
+//! Retained RAM: statistics and settings that a warm reset keeps, with checksums over content, build and settings.
 //!
-//! With one spare slot, a write never overwrites a newest version.
+//! One slot is spare, so that a write never overwrites the newest version.
 
 use crate::channels::CHANNELS;
 use crate::epoch::FinishedEpoch;
@@ -10,7 +10,7 @@ use crate::statistics::ChannelSums;
 use adis16405_driver::{Config, GyroRange, SamplePeriod};
 use serde::{Deserialize, Serialize};
 
-/// Kind, version, generation, sensor settings.
+/// Words before the content: kind, version, generation, sensor settings.
 const HEAD: usize = 4;
 const BUILD: u32 = match u32::from_str_radix(env!("FIRMWARE_BUILD"), 10) {
     Ok(hash) => hash,
@@ -18,12 +18,12 @@ const BUILD: u32 = match u32::from_str_radix(env!("FIRMWARE_BUILD"), 10) {
 };
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
-/// s; then nothing stored is used.
+/// Time in which three crashes stop the use of stored data, s.
 const CRASHES_S: u32 = 600;
-/// Then the finished epoch is dropped.
+/// Number of crashes after which the finished epoch is dropped.
 const CRASHES_OF_EPOCH: u32 = 2;
 
-/// For a linker section that is not initialised.
+/// The memory, for a linker section that is not initialised.
 pub struct RetainedMemory {
     records: [Slot<{ HEAD + SUMS_WORDS }>; KINDS + 1],
     epoch: Slot<EPOCH_WORDS>,
@@ -37,7 +37,7 @@ pub const fn blank_memory() -> RetainedMemory {
     RetainedMemory { records, epoch: Slot::blank(), crashes: Slot::blank() }
 }
 
-/// A person's settings, in the order of their bytes in flash.
+/// The user's settings, in the order of their bytes in flash.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UserSettings {
     /// Value of SMPL_PRD.
@@ -48,12 +48,12 @@ pub struct UserSettings {
     pub epoch_s: u32,
     /// Seconds between reports, 0 for none.
     pub interval_s: u32,
-    /// Accepted for an ADIS16405; 0 for none.
+    /// PROD_ID accepted for an ADIS16405; 0 for none.
     pub prod_id: u16,
 }
 
 impl UserSettings {
-    /// Scale, rate and filter of samples.
+    /// The settings on which scale, rate and filter of the samples depend.
     pub(crate) fn of_sensor(self) -> u32 {
         u32::from(self.smpl_prd) << 16 | u32::from(self.sens_avg)
     }
@@ -72,13 +72,13 @@ impl UserSettings {
 /// The settings of the application.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RetainedSettings {
-    /// Also kept in flash.
+    /// The user's settings, which are also kept in flash.
     pub user: UserSettings,
     /// Number of epochs finished.
     pub epoch: u32,
     /// Starts since power-on.
     pub starts: u32,
-    /// At the last checkpoint, µs.
+    /// Age of the epoch at the last checkpoint, µs.
     pub epoch_age_us: u64,
 }
 
@@ -97,9 +97,9 @@ impl RetainedSettings {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Crashes {
-    /// Last and second last, s.
+    /// Ages of the last and of the second last crash, s.
     ages_s: [u32; 2],
-    /// Before the finished epoch was learned from.
+    /// Number of crashes before the finished epoch was learned from.
     of_epoch: u32,
 }
 
@@ -123,7 +123,7 @@ pub struct RetainedRam {
 }
 
 impl RetainedRam {
-    /// Finds the newest valid version of every record.
+    /// Opens the memory and finds the newest valid version of every record.
     #[must_use]
     pub fn open(memory: &'static RetainedMemory) -> Self {
         Self::open_by(BUILD, memory)
@@ -167,14 +167,14 @@ impl RetainedRam {
         *self = Self::open_by(self.build, self.memory);
     }
 
-    /// Notes a crash; true for the third within ten minutes, when stored data must not be used.
+    /// Notes a crash. True for the third within ten minutes, after which stored data must not be used.
     pub(crate) fn note_crash(&mut self) -> bool {
         let Crashes { ages_s: [last, before], of_epoch } = self.crashes;
         self.write_crashes(Crashes { ages_s: [0, last], of_epoch: of_epoch.saturating_add(1) });
         before <= CRASHES_S
     }
 
-    /// Run time, s.
+    /// Adds run time, s.
     pub(crate) fn note_time(&mut self, seconds: u32) {
         let ages_s = self.crashes.ages_s.map(|age| age.saturating_add(seconds));
         if ages_s != self.crashes.ages_s {
@@ -203,30 +203,31 @@ impl RetainedRam {
         (generation == self.generation && of_sensor == self.of_sensor()).then_some(sums)
     }
 
-    /// Replaces the finished epoch; a reset during the write loses it.
+    /// Replaces the finished epoch. A reset during the write loses it.
     pub fn write_epoch(&mut self, epoch: &mut FinishedEpoch) {
         self.write_crashes(Crashes { of_epoch: 0, ..self.crashes });
         self.memory.epoch.write(self.epoch_key(), |words| visit_epoch(epoch, words));
     }
 
-    /// Restores into `epoch`; false without one, or after two crashes before it was learned from.
+    /// Restores the finished epoch into `epoch`. False if there is none, or after two crashes before it was learned
+    /// from.
     #[must_use]
     pub fn restore_epoch(&self, epoch: &mut FinishedEpoch) -> bool {
         let words = self.memory.epoch.read(self.epoch_key()).filter(|_| self.crashes.of_epoch < CRASHES_OF_EPOCH);
         words.map(|mut words| visit_epoch(epoch, &mut words)).is_some()
     }
 
-    /// After learning.
+    /// Removes the finished epoch, after learning.
     pub fn clear_epoch(&mut self) {
         self.memory.epoch.clear();
     }
 
-    /// With the sensor's settings.
+    /// Key of the epoch, which contains the sensor's settings.
     fn epoch_key(&self) -> u32 {
         self.build ^ self.of_sensor()
     }
 
-    /// `new_generation` outdates the channel records.
+    /// Writes the settings; `new_generation` makes the channel records outdated.
     pub fn write_settings(&mut self, mut settings: RetainedSettings, new_generation: bool) {
         self.generation = self.generation.wrapping_add(u32::from(new_generation));
         self.settings = Some(settings);
@@ -301,7 +302,7 @@ mod tests {
         }
     }
 
-    /// Up to 96 bits; larger ones saturate.
+    /// Sums of up to 96 bits are exact; larger ones saturate.
     #[test]
     fn wide_sums_are_stored_exactly() {
         let memory = memory();
@@ -410,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn the_third_crash_within_ten_minutes_is_told() {
+    fn the_third_crash_within_ten_minutes_is_reported() {
         let memory = memory();
         let crash_after = |seconds: u32| {
             let mut retained = RetainedRam::open(memory);

@@ -11,20 +11,22 @@ use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults, Valid
 use heapless::spsc;
 use link::{Health, MessageRef};
 
-/// Unusable bursts in trouble; a usable one makes up for half.
+/// Unusable bursts after which the sensor is in trouble; a usable burst cancels half of one.
 const UNUSABLE_BURSTS: u32 = 16;
 
-/// Equal bursts of a frozen sensor, in filter lengths; chance makes fewer.
+/// Number of filter lengths for which a frozen sensor's bursts are equal; chance gives fewer.
 const FROZEN_FILTER_LENGTHS: u32 = 4;
 const FROZEN_BURSTS: u32 = 16;
 
-/// Used bursts of a working sensor; twice a frozen one's behind a long filter.
+/// Used bursts after which the sensor counts as working; twice as many as a frozen one can give behind a long filter.
 const SETTLED_BURSTS: u32 = 100;
 
-/// Memory of the analogue channel, µs: 12.7 times the 0.48 ms of two poles at 330 Hz (data sheet Rev. B, Table 1).
+/// Settling time of the analogue channel, µs: 12.7 times the 0.48 ms of two poles at 330 Hz (data sheet Rev. B, Table
+/// 1).
 const ANALOGUE_SETTLING_US: u64 = 6_200;
 
-/// Samples after a probe that hold earlier ones: 2N of the filter's 2N + 1 taps (Fig. 15; N = 2^M).
+/// Samples after a probe that depend on earlier ones: 2N of the filter's 2N + 1 taps (Fig. 15; N = 2^M), and the
+/// analogue part.
 fn settling_samples(config: Config) -> u32 {
     let analogue = (ANALOGUE_SETTLING_US as f64 * 1e-6 * config.sample_period().hz()) as u32 + 1;
     (2 << config.filter_taps_log2()) + analogue
@@ -33,13 +35,13 @@ fn settling_samples(config: Config) -> u32 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorTrouble {
-    /// For several periods.
+    /// No edge has come for several periods.
     NoEdges,
     EdgeRate,
     Unusable(&'static str),
 }
 
-/// The estimators of all channels; lost samples are missing in all, refused ones in theirs.
+/// The estimators of all channels. A lost sample is missing in all of them, a refused one in its channel.
 pub struct Estimators<'m> {
     config: Config,
     statistics: &'m mut Statistics,
@@ -47,9 +49,9 @@ pub struct Estimators<'m> {
     validator: BurstValidator,
     gate: GrossErrorGate,
     pub(crate) monitor: DataReadyMonitor,
-    /// The validator's are added on reading.
+    /// Counters without the validator's, which are added on reading.
     health: Health,
-    /// +2 per unusable, −1 per usable burst.
+    /// Score of +2 per unusable and −1 per usable burst.
     unusable: u32,
     unusable_cause: &'static str,
     repeated: u32,
@@ -64,7 +66,7 @@ pub struct Estimators<'m> {
 }
 
 impl<'m> Estimators<'m> {
-    /// Continue from `statistics`.
+    /// Estimators that continue from `statistics`.
     pub fn new(statistics: &'m mut Statistics, config: Config) -> Self {
         Self {
             config,
@@ -87,7 +89,7 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Processes the burst of one edge, `waiting` more being queued; true if a raw message is full.
+    /// Processes the burst of one edge, with `waiting` more in the queue. True if a raw message is full.
     pub fn process(&mut self, timed: TimedBurst, waiting: usize) -> bool {
         self.processed = self.processed.wrapping_add(1);
         let health = &mut self.health;
@@ -113,7 +115,7 @@ impl<'m> Estimators<'m> {
         self.monitor.is_suspect() || self.unusable >= 2 * UNUSABLE_BURSTS
     }
 
-    /// Reason for a probe at `now_us`.
+    /// The reason for a probe at `now_us`, if any.
     pub(crate) fn trouble(&self, now_us: u64) -> Option<SensorTrouble> {
         if self.monitor.is_silent_at(now_us) {
             Some(SensorTrouble::NoEdges)
@@ -134,7 +136,7 @@ impl<'m> Estimators<'m> {
         self.processed
     }
 
-    /// After a probe at `now_us`: samples are used once the filter has settled.
+    /// Accepts samples after a probe at `now_us`, once the filter has settled.
     pub fn accept_samples_after_settling(&mut self, now_us: u64) {
         self.monitor.restart_at(now_us);
         self.unusable = 0;
@@ -144,7 +146,7 @@ impl<'m> Estimators<'m> {
         self.error_flag = false;
     }
 
-    /// Starts again for `config`; the raw stream stays as it is.
+    /// Starts again with the configuration `config`; the raw stream stays as it is.
     pub fn restart(&mut self, config: Config) {
         self.reset();
         self.config = config;
@@ -156,14 +158,14 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// The next sample begins an epoch; counters go on.
+    /// Ends the epoch: the next sample begins another one. Counters go on.
     pub(crate) fn end_epoch(&mut self, take: impl FnOnce(&Statistics)) {
         take(self.statistics);
         self.finished_losses = self.statistics.losses;
         self.statistics.reset();
     }
 
-    /// Resets statistics and counters, not the data-ready monitor and sample numbers.
+    /// Resets statistics and counters, but not the data-ready monitor and the sample numbers.
     pub fn reset(&mut self) {
         self.statistics.reset();
         self.finished_losses = SampleLosses::NONE;
@@ -182,7 +184,7 @@ impl<'m> Estimators<'m> {
         self.statistics.estimators.get(index)
     }
 
-    /// Continues from sums before a restart, which those over pairs do not cover.
+    /// Continues a channel from its sums before a restart, which the sums over pairs do not include.
     pub fn restore(&mut self, index: usize, sums: &ChannelSums) {
         if let Some(estimator) = self.statistics.estimators.get_mut(index) {
             sums.restore(estimator);
@@ -206,7 +208,7 @@ impl<'m> Estimators<'m> {
         self.monitor.measured_hz()
     }
 
-    /// Units of counts and samples.
+    /// The scale of counts and samples.
     #[must_use]
     pub fn scale(&self) -> ReportScale {
         ReportScale::new(self.config, self.measured_hz())
@@ -264,7 +266,7 @@ impl<'m> Estimators<'m> {
         add(&mut health.marked, u32::from(faults.intersects(Faults::SUPPLY | Faults::ERROR_ALARM)));
     }
 
-    /// An unused burst; rare, so not inlined.
+    /// Handles a burst that is not used. It is rare, and so not inlined.
     #[inline(never)]
     fn settle(&mut self, burst: &Burst) {
         let counts = estimated_counts(burst);
@@ -276,13 +278,13 @@ impl<'m> Estimators<'m> {
             self.gate.find(&counts, ChannelSet::EMPTY);
         }
         add(&mut self.health.settling, 1);
-        // No gap before the first sample.
+        // There is no gap before the first sample.
         if self.statistics.has_samples() {
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
         }
     }
 
-    /// Two averages of 2^M samples.
+    /// The number of equal bursts of a frozen sensor: the filter averages 2^M samples twice.
     fn frozen_after(&self) -> u32 {
         (FROZEN_FILTER_LENGTHS << (self.config.filter_taps_log2() + 1)).max(FROZEN_BURSTS)
     }

@@ -1,4 +1,4 @@
-//! Units of counts and sample numbers.
+//! Units of counts and of sample numbers.
 
 use adis16405_driver::{Channel, Config};
 
@@ -10,14 +10,14 @@ pub struct ReportScale {
 }
 
 impl ReportScale {
-    /// With the measured rate in Hz, else the programmed one. Clocks are within 3 % (ADIS16400/ADIS16405 data sheet
-    /// Rev. B, Table 1).
+    /// The scale with the measured rate in Hz, or else the programmed one. Clocks are within 3 % (ADIS16400/ADIS16405
+    /// data sheet Rev. B, Table 1).
     #[must_use]
     pub fn new(config: Config, measured_hz: Option<f64>) -> Self {
         Self { config, rate_hz: measured_hz.unwrap_or(config.sample_period().hz()) }
     }
 
-    /// Samples a second.
+    /// Samples per second.
     #[must_use]
     pub fn rate_hz(self) -> f64 {
         self.rate_hz
@@ -29,7 +29,7 @@ impl ReportScale {
         1.0 / self.rate_hz
     }
 
-    /// Size of a count of a channel in its unit.
+    /// Size of one count of a channel in its unit.
     #[must_use]
     pub fn lsb(self, channel: Channel) -> f64 {
         channel.lsb(self.config.range())

@@ -1,4 +1,4 @@
-//! The sensor's bus apart from sampling: clock, probe, auto-null.
+//! The sensor's bus outside of sampling: clock, probe, auto-null.
 
 use adis16405_driver::{Adis16405, Channel, Config, Diagnosis, DioSignal, Error, GyroBias, Product, Register, Timing};
 use core::fmt;
@@ -10,8 +10,8 @@ pub const BURST_LIMIT_HZ: u32 = 1_000_000;
 /// Largest serial clock in the sensor's low-power mode in Hz (data sheet Rev. B, page 10).
 pub(crate) const LOW_POWER_LIMIT_HZ: u32 = 300_000;
 
-/// CR1's field for the largest clock of at most `limit_hz`, or the slowest one, and that clock in Hz, rounded up:
-/// `bus_hz` over `2^(field + 1)`. Some HALs round the requested clock up, above the sensor's limit.
+/// The field of CR1 for the largest clock of at most `limit_hz`, or for the slowest one, and that clock in Hz, rounded
+/// up: `bus_hz` over `2^(field + 1)`. Some HALs round the requested clock up, above the sensor's limit.
 #[must_use]
 pub fn prescaled_clock(bus_hz: u32, limit_hz: u32) -> (u8, u32) {
     let clock_hz = |field: u8| bus_hz.div_ceil(2 << field);
@@ -19,18 +19,18 @@ pub fn prescaled_clock(bus_hz: u32, limit_hz: u32) -> (u8, u32) {
     (field, clock_hz(field))
 }
 
-/// How thoroughly a sensor is probed.
+/// The scope of a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProbeScope {
-    /// First end an unfinished frame, and wake a sensor that sleeps, by a pulse on chip select.
+    /// End an unfinished frame, and wake a sleeping sensor, by a pulse on chip select first.
     pub pulse: bool,
-    /// First reset the sensor by its command.
+    /// Reset the sensor by its command first.
     pub reset: bool,
     /// Run the self-test.
     pub self_test: bool,
 }
 
-/// For either power mode: low-power stall at `sck_hz`.
+/// A driver for either power mode: with the low-power stall at `sck_hz`.
 pub(crate) fn addressed<SPI: SpiDevice<u8>, D: DelayNs>(
     (bus, delay): (SPI, D),
     config: Config,
@@ -48,14 +48,14 @@ pub struct SensorIdentity {
     pub test: Option<TestOutcome>,
 }
 
-/// End of a self-test; none makes samples unusable, as motion fails it too (data sheet Rev. B, page 15).
+/// Outcome of a self-test. None makes samples unusable, since motion fails it too (data sheet Rev. B, page 15).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TestOutcome {
-    /// It has ended with these flags, those of failed sensors among them.
+    /// The test ended with these flags, among them those of failed sensors.
     Ended(Diagnosis),
-    /// It was not seen to run; these are the flags.
+    /// The test was not seen to run; these are the flags.
     NotSeen(Diagnosis),
-    /// It did not end.
+    /// The test did not end.
     Endless,
 }
 
@@ -109,7 +109,7 @@ impl fmt::Display for TestOutcome {
 /// DIO1, active high. A negative bias of gyro x moves to the host.
 ///
 /// # Errors
-/// The bus failed, another product answered, or a register did not take its value. A self-test that fails is none.
+/// The bus failed, another product answered, or a register did not take its value. A failed self-test is not an error.
 pub fn probe<SPI: SpiDevice<u8>>(
     bus: (SPI, impl DelayNs),
     config: Config,
@@ -117,13 +117,13 @@ pub fn probe<SPI: SpiDevice<u8>>(
     scope: ProbeScope,
     prod_id: u16,
 ) -> Result<SensorIdentity, Error<SPI::Error>> {
-    // Perhaps in low-power mode.
+    // The sensor may be in low-power mode.
     let mut sensor = addressed(bus, config, sck_hz);
     if prod_id != 0 {
         sensor = sensor.with_prod_id(prod_id);
     }
     if scope.pulse {
-        // `init` checks that the sensor answers.
+        // The result of the pulse does not matter: `init` checks that the sensor answers.
         let _ = sensor.wake();
     }
     let product = if scope.reset { sensor.software_reset()? } else { sensor.init()? };
@@ -141,7 +141,7 @@ fn self_test<SPI: SpiDevice<u8>>(sensor: &mut Adis16405<SPI, impl DelayNs>) -> R
     }
 }
 
-/// Clears DIAG_STAT; `None` if the bus failed or all bits are set, one of which is undefined.
+/// Reads and so clears DIAG_STAT; `None` if the bus failed or all bits are set, one of which is undefined.
 pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
     (bus, delay): (SPI, impl DelayNs),
     config: Config,
@@ -150,7 +150,7 @@ pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
     (answer != u16::MAX).then(|| Diagnosis::from_bits_truncate(answer))
 }
 
-/// Has the sensor store its present gyro output as the bias; it must be still. Returns the correction: a negative one
+/// Makes the sensor store its present gyro output as the bias; it must be still. Returns the correction. A negative one
 /// of x is not applied.
 ///
 /// # Errors
@@ -167,7 +167,7 @@ pub fn auto_null<SPI: SpiDevice<u8>>(
 mod tests {
     use super::*;
 
-    /// 0b000 divides by 2, 0b111 by 256 (RM0090 section 28.5.1).
+    /// The field 0b000 divides by 2, 0b111 by 256 (RM0090 section 28.5.1).
     #[test]
     fn the_clock_does_not_exceed_the_limit() {
         assert_eq!(prescaled_clock(84_000_000, 1_000_000), (0b110, 656_250));

@@ -1,4 +1,5 @@
-//! A record in flash that survives a loss of power at any time: appended with a checksum before the old one goes.
+//! A record in flash that survives a loss of power at any time: it is appended with a checksum before the old one is
+//! erased.
 
 use core::future::Future;
 use core::ops::Range;
@@ -14,7 +15,7 @@ pub const MAX_RECORD: usize = 3072;
 #[repr(align(8))]
 struct RecordBuffer([u8; MAX_RECORD + 8]);
 
-/// An item with its own key: for one of no bytes `sequential-storage` panics.
+/// The bytes of an item after a byte of the key: `sequential-storage` panics on an item of no bytes.
 struct Item<'a>(&'a [u8]);
 
 impl<'a> Value<'a> for Item<'a> {
@@ -30,7 +31,7 @@ impl<'a> Value<'a> for Item<'a> {
     }
 }
 
-/// Failure of a write; the record before is kept.
+/// Failure of a write; the previous record is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoreError {
     /// The board has no memory for settings.
@@ -51,13 +52,13 @@ impl core::fmt::Display for StoreError {
     }
 }
 
-/// A record in a range of a flash memory.
+/// A record in a range of flash memory.
 pub struct SettingsStore<F: NorFlash> {
     map: MapStorage<(), F, Cache<Uncached, Uncached, Uncached, ()>>,
 }
 
 impl<F: NorFlash> SettingsStore<F> {
-    /// A store in `range`, at least two whole pages; else `None`.
+    /// A store in `range`; `None` unless it has two or more whole pages.
     pub fn new(flash: F, range: Range<u32>) -> Option<Self> {
         let config = MapConfig::try_new(range).ok()?;
         Some(Self { map: MapStorage::new(flash, config, Cache::new_uncached()) })
@@ -71,10 +72,11 @@ impl<F: NorFlash> SettingsStore<F> {
         Some(found.len())
     }
 
-    /// Replaces the record, or erases it if `record` is empty; reads it back. Foreign pages are erased first.
+    /// Replaces the record, or erases it if `record` is empty, and reads it back. Pages with other content are erased
+    /// first.
     ///
     /// # Errors
-    /// The record is too long, or the flash does not take it.
+    /// [`StoreError`]: the record is too long, or the flash does not take it.
     pub fn replace(&mut self, record: &[u8]) -> Result<(), StoreError> {
         if record.len() > MAX_RECORD {
             return Err(StoreError::TooLong);
@@ -86,7 +88,7 @@ impl<F: NorFlash> SettingsStore<F> {
         for was_erased in [false, true] {
             let written = complete(self.map.store_item(&mut buffer.0, &(), &Item(record)));
             let found = self.find(&mut buffer);
-            // Refusing flash keeps the record, or stays blank.
+            // Erasing does not help if the flash refuses the write: it keeps the old record, or stays blank.
             let erasing_helps = match written {
                 Some(Ok(())) if found == Some(record) => return Ok(()),
                 Some(Ok(())) => found.is_none() && !self.is_blank(&mut buffer),
@@ -105,7 +107,7 @@ impl<F: NorFlash> SettingsStore<F> {
         complete(self.map.fetch_item::<Item<'b>>(&mut buffer.0, &()))?.ok()?.map(|item| item.0)
     }
 
-    /// Erasing blank pages would take seconds without samples.
+    /// True if the memory is blank: erasing it would take seconds without samples.
     fn is_blank(&mut self, buffer: &mut RecordBuffer) -> bool {
         const CHUNK: usize = 256;
         let (range, chunk) = (self.map.flash_range(), &mut buffer.0[..CHUNK]);
@@ -120,7 +122,7 @@ impl<F: NorFlash> SettingsStore<F> {
     }
 }
 
-/// `None` if the future waits.
+/// The result of a future; `None` if it waits.
 fn complete<T>(future: impl Future<Output = T>) -> Option<T> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(result) => Some(result),

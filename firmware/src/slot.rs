@@ -1,14 +1,14 @@
-//! Words with a checksum and key that a warm reset keeps; atomic, so any content is valid.
+//! Words with a checksum and a key that a warm reset keeps. They are atomic, so any content is valid.
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// Largest sum that a record keeps.
+/// Largest sum that a record can hold.
 pub(crate) const MAX_SUM: u128 = (1 << 96) - 1;
 
 pub(crate) struct Slot<const WORDS: usize> {
-    /// Checked first: checksums take milliseconds on a Cortex-M0+.
+    /// The key is checked first, since checksums take milliseconds on a Cortex-M0+.
     key: AtomicU32,
     words: [AtomicU32; WORDS],
     checksum: AtomicU32,
@@ -19,7 +19,7 @@ impl<const WORDS: usize> Slot<WORDS> {
         Self { key: AtomicU32::new(0), words: [const { AtomicU32::new(0) }; WORDS], checksum: AtomicU32::new(0) }
     }
 
-    /// Key 0 is none. Words that `visit` does not write stay as they are.
+    /// Writes words with a key; key 0 marks an empty slot. Words that `visit` does not write stay as they are.
     pub(crate) fn write(&self, key: u32, visit: impl FnOnce(&mut Words<'_>)) {
         self.key.store(key, Relaxed);
         visit(&mut Words { is_writing: true, ..self.words() });
@@ -58,7 +58,7 @@ impl<const WORDS: usize> Slot<WORDS> {
     }
 }
 
-/// Writes numbers to a slot, or reads them from it in the same order; beyond its end they stay as they are.
+/// Writes numbers to a slot, or reads them in the same order. Numbers beyond the slot's end stay as they are.
 pub(crate) struct Words<'s> {
     cells: core::slice::Iter<'s, AtomicU32>,
     is_writing: bool,
@@ -86,7 +86,7 @@ impl Words<'_> {
         *wide = u64::from(low) | u64::from(high) << 32;
     }
 
-    /// At most [`MAX_SUM`].
+    /// Visits a sum of at most [`MAX_SUM`].
     pub(crate) fn sum(&mut self, sum: &mut u128) {
         let capped = (*sum).min(MAX_SUM);
         let (mut low, mut high) = (capped as u64, (capped >> 64) as u32);

@@ -20,11 +20,11 @@ pub struct Statistics {
     pub(crate) losses: SampleLosses,
 }
 
-/// Since the statistics or the device began.
+/// Losses since the statistics or the device began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SampleLosses {
     pub(crate) lost: u64,
-    /// Per channel of [`CHANNELS`].
+    /// Refused samples per channel of [`CHANNELS`].
     pub(crate) refused: [u64; CHANNELS.len()],
 }
 
@@ -43,7 +43,7 @@ impl Statistics {
         }
     }
 
-    /// Except in `refused` channels.
+    /// Adds a sample to all channels except the `refused` ones.
     pub(crate) fn push(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
         if refused.is_empty() {
             for (estimator, count) in self.estimators.iter_mut().zip(counts) {
@@ -92,7 +92,7 @@ impl Default for Statistics {
     }
 }
 
-/// Exact sums of one channel for reports and models: a fifth of the estimator, without fourth powers.
+/// Exact sums of one channel for reports and models. They are a fifth of the estimator's size, without fourth powers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChannelSums {
     /// Samples taken.
@@ -121,7 +121,7 @@ impl ChannelSums {
         sums
     }
 
-    /// Has an estimator continue from these sums, as after a gap.
+    /// Makes an estimator continue from these sums, as after a gap.
     pub fn restore(&self, estimator: &mut ChannelEstimator) {
         estimator.restore(self.samples, self.missing, |octave| self.octave(octave));
     }

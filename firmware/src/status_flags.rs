@@ -1,13 +1,13 @@
-//! The sensor's status register, whose flags stay set until a read: reading while sampling, counts of causes.
+//! The sensor's status register, whose flags stay set until it is read: reads during sampling, counts of causes.
 
 use crate::counters::add;
 use adis16405_driver::Diagnosis;
 use core::fmt;
 use link::Health;
 
-/// Between reads; a persistent cause is set again.
+/// Least time between reads, µs; a persistent cause is set again.
 const READ_US: u64 = 1_000_000;
-/// Repeats the log of a persistent cause.
+/// Time after which a persistent cause is logged again, µs.
 const LOG_US: u64 = 600_000_000;
 
 type CounterOf = fn(&mut Health) -> &mut u32;
@@ -26,7 +26,7 @@ const CAUSES: [(Diagnosis, &str, CounterOf); 8] = [
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StatusFlags {
     next_read_us: u64,
-    /// Since [`LOG_US`] before `forget_us`.
+    /// Causes logged since [`LOG_US`] before `forget_us`.
     logged: Diagnosis,
     forget_us: u64,
 }
@@ -36,7 +36,7 @@ impl StatusFlags {
         now_us >= self.next_read_us
     }
 
-    /// Content read at `now_us`, if answered; counts causes and returns those to log.
+    /// Takes the content read at `now_us`, if the sensor answered. Counts causes and returns those to be logged.
     pub(crate) fn add(
         &mut self,
         diagnosis: Option<Diagnosis>,
@@ -98,7 +98,7 @@ mod tests {
         }
         let low_bits = [health.diag_supply_low, health.diag_supply_high, health.diag_flash_update, health.diag_spi];
         assert_eq!((low_bits, health.diag_over_range, health.diag_flash_checksum), ([1; 4], 1, 1), "{health:?}");
-        // Bit 5 and six sensors; two alarms; bit 7 is undefined.
+        // Bit 5 and six sensors make 7, the alarms 2; bit 7 is undefined.
         assert_eq!((health.diag_self_test, health.diag_alarm, health.diag_reads), (7, 2, 16));
     }
 

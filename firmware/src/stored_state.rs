@@ -1,4 +1,4 @@
-//! Bytes kept without power: a person's settings, the last epoch's models.
+//! State kept without power: the user's settings, and the models of the last epoch.
 
 use crate::channels::CHANNELS;
 use crate::epoch::Regressor;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 const FORMAT: u8 = 1;
 
-/// In the order of the bytes.
+/// The stored settings, in the order of their bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct StoredSettings {
     pub(crate) user: UserSettings,
@@ -18,20 +18,20 @@ pub(crate) struct StoredSettings {
 
 type Models = [EpochModel; INERTIAL];
 
-/// Returns the length; `None` without room.
+/// Encodes settings and models into `record`; `None` without room.
 pub(crate) fn encode<'r>(settings: &StoredSettings, models: &Models, record: &'r mut [u8]) -> Option<&'r [u8]> {
     postcard::to_slice(&(FORMAT, settings, models), record).ok().map(|bytes| &*bytes)
 }
 
-/// With the rest, the models; `None` for another format.
+/// Decodes the settings, and returns them with the remaining bytes, the models. `None` for another format.
 pub(crate) fn decode_settings(record: &[u8]) -> Option<(StoredSettings, &[u8])> {
     let (&format, rest) = record.split_first()?;
     (format == FORMAT).then(|| postcard::take_from_bytes(rest).ok())?
 }
 
-/// From the rest; false, and no model, if damaged.
+/// Decodes the models from the remaining bytes. False, and no model, if they are damaged.
 pub(crate) fn decode_models(mut rest: &[u8], models: &mut Models) -> bool {
-    // One by one, to save stack.
+    // Models are decoded one by one to save stack.
     let decoded = models.iter_mut().all(|model| match decode_model(rest) {
         Some((decoded, later)) => {
             (*model, rest) = (decoded, later);
@@ -65,8 +65,8 @@ mod tests {
         raw_stream: true,
     };
 
-    /// Format 1 by postcard: groups of 7 bits, lowest first; the first channel with N, B, K, a term and a regressor.
-    /// Devices in use have it in their flash.
+    /// A record of format 1 by postcard: groups of 7 bits, lowest first; the first channel has N, B, K, a term and a
+    /// regressor. Devices in use have this format in their flash.
     fn kept() -> Vec<u8> {
         let mut bytes = vec![1, 0x81, 0x82, 0x08, 0x90, 0x1C, 0x3C, 0x90, 0x80, 0x01, 1];
         bytes.push(1);
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn the_kept_bytes_are_read_and_written_as_ever() {
+    fn the_kept_bytes_are_read_and_written_unchanged() {
         let (settings, rest) =
             decode_settings(&kept()).map(|(settings, rest)| (settings, rest.to_vec())).expect("format 1");
         assert_eq!(settings, SETTINGS);
@@ -104,7 +104,7 @@ mod tests {
         let mut models = [const { EpochModel::EMPTY }; INERTIAL];
         let other: Vec<u8> = kept().into_iter().enumerate().map(|(at, byte)| if at == 0 { 2 } else { byte }).collect();
         assert!(decode_settings(&other).is_none() && decode_settings(&[]).is_none());
-        // The covariate has to be a channel.
+        // A covariate that is not a channel is damage.
         let mut damaged = kept()[11..].to_vec();
         damaged[1 + 24 + 2 + 8 + 1] = CHANNELS.len() as u8;
         assert!(!decode_models(&damaged, &mut models));

@@ -1,19 +1,20 @@
-//! Transmission: queues for the ports, and raw messages.
+//! Transmission: the queues to the ports, and raw messages.
 
 use adis16405_driver::Burst;
 use heapless::{Vec, spsc};
 use link::{Encoder, MAX_FRAME, MAX_RAW_FRAME, MAX_TEXT, MessageRef, RawBurst, RawMessage, TextLine, wire_bytes};
 
-/// Longest message, reserve, and an enclosed text line; one slot stays empty.
+/// Size of the queue: the longest message, the reserve and an enclosed text line; one slot stays empty.
 const BUFFER_SLOTS: usize = MAX_FRAME + RAW_RESERVE + MAX_TEXT + 8;
 
 /// The bytes from the application to a serial port.
 pub type TransmitBuffer = spsc::Queue<u8, BUFFER_SLOTS>;
 
-/// Reports leave room for two raw messages, bytes.
+/// Room that reports leave for two raw messages, bytes.
 const RAW_RESERVE: usize = 2 * MAX_RAW_FRAME;
 
-/// Encodes messages and text for the UART, whole or not at all; what USB has no room for is dropped and counted.
+/// Encodes messages and text for the UART, whole or not at all. Copies that USB has no room for are dropped and
+/// counted.
 pub struct TransmitQueue<'q> {
     encoder: Encoder,
     uart: spsc::Producer<'q, u8>,
@@ -22,30 +23,31 @@ pub struct TransmitQueue<'q> {
 }
 
 impl<'q> TransmitQueue<'q> {
-    /// A queue to a UART alone, whose first message has the sequence number 0.
+    /// A queue to a UART alone; its first message has the sequence number 0.
     pub fn new(uart: spsc::Producer<'q, u8>) -> Self {
         Self { encoder: Encoder::new(), uart, usb: None, usb_dropped: 0 }
     }
 
-    /// With copies for USB, if any.
+    /// Adds a queue for copies to USB, if there is one.
     #[must_use]
     pub fn with_usb(self, usb: Option<spsc::Producer<'q, u8>>) -> Self {
         Self { usb, ..self }
     }
 
-    /// For the longest message and the raw reserve.
+    /// True if there is room for the longest message and the raw reserve.
     #[must_use]
     pub fn has_room(&self) -> bool {
         free(&self.uart) >= MAX_FRAME + RAW_RESERVE
     }
 
-    /// Messages and text lines that the USB port had no room for.
+    /// Messages and text lines for which the USB port had no room.
     #[must_use]
     pub fn usb_dropped(&self) -> u32 {
         self.usb_dropped
     }
 
-    /// Queues a message; false, and dropped, if the longest of its kind would not fit: the receiver sees the sequence.
+    /// Queues a message. It is dropped, and the result false, if the longest of its kind would not fit; the receiver
+    /// notices the missing sequence number.
     pub fn send(&mut self, message: MessageRef<'_>) -> bool {
         let longest = match message {
             MessageRef::Log(_) | MessageRef::Raw(_) => MAX_RAW_FRAME,
@@ -104,9 +106,9 @@ fn put(buffer: &mut spsc::Producer<'_, u8>, bytes: &[u8]) {
     }
 }
 
-/// Bursts, usable or not, in raw messages.
+/// The raw stream: bursts, usable or not, in raw messages.
 pub(crate) struct RawStream {
-    /// `None` while off.
+    /// The message being filled; `None` while the stream is off.
     message: Option<RawMessage>,
     last: (u64, u64),
 }
@@ -120,9 +122,9 @@ impl RawStream {
         self.message.is_some()
     }
 
-    /// Off, or on at `sens_avg`; unsent bursts are dropped.
+    /// Switches the stream off, or on at `sens_avg`; unsent bursts are dropped.
     pub(crate) fn set(&mut self, on: bool, sens_avg: u16) {
-        // In place: 560 bytes of stack.
+        // The message is built in place: a move would take 560 bytes of stack.
         self.message = None;
         if on {
             self.message = Some(RawMessage { first: 0, at_us: 0, sens_avg, bursts: Vec::new() });

@@ -1,5 +1,5 @@
-//! The USB serial port (CDC-ACM) over any [`UsbBus`]; an absent host's bytes stay queued, then are [dropped and
-//! counted](crate::TransmitQueue).
+//! The USB serial port (CDC-ACM) over any [`UsbBus`]. Bytes for an absent host stay queued, and later ones are [dropped
+//! and counted](crate::TransmitQueue).
 
 use crate::receive::{Receiver, ServedPort};
 use heapless::Vec;
@@ -12,14 +12,15 @@ use usbd_serial::{SerialPort, USB_CLASS_CDC};
 pub const MANUFACTURER: &str = "Noise observatory";
 /// Name of the product in the descriptors.
 pub const PRODUCT: &str = "ADIS16405 noise observatory";
-/// Full speed (USB 2.0, section 5.8.3).
+/// Bytes of a packet at full speed (USB 2.0, section 5.8.3).
 const PACKET: usize = 64;
-/// mA: 70 for the sensor (ADIS16400/ADIS16405 data sheet Rev. B, Table 1), and the board.
+/// Supply current, mA: 70 for the sensor (ADIS16400/ADIS16405 data sheet Rev. B, Table 1), and the board.
 const SUPPLY_MA: usize = 250;
 
-/// A stalled open port, µs: an RP2040 may hang behind a hub (RP2040 data sheet, erratum RP2040-E15).
+/// Time without progress after which an open port counts as stalled, µs: an RP2040 may hang behind a hub (RP2040 data
+/// sheet, erratum RP2040-E15).
 const STALL_US: u32 = 30_000_000;
-/// Off the bus afterwards, µs.
+/// Time for which a stalled port stays off the bus, µs.
 const OFF_US: u32 = 500_000;
 
 /// A USB serial port between a transmit and a receive queue.
@@ -30,9 +31,9 @@ pub struct UsbPort<'a, B: UsbBus> {
     receive: Receiver<'a>,
     waiting: Vec<u8, PACKET>,
     is_open: bool,
-    /// Controller off the bus (false), or on again (true).
+    /// Takes the controller off the bus (false), or starts it again (true).
     reconnect: fn(bool),
-    /// Byte taken, none waiting, or off the bus.
+    /// Last time at which a byte was taken, none was waiting, or the port was off the bus, µs.
     moved_us: u32,
     is_off: bool,
 }
@@ -64,7 +65,7 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
 
     fn receive(&mut self) -> u32 {
         let (mut packet, mut lost) = ([0; PACKET], 0);
-        // Also without room: untaken packets interrupt again.
+        // Packets are read even without room, since an unread packet raises the interrupt again.
         while let Ok(length) = self.serial.read(&mut packet)
             && length > 0
         {
@@ -94,7 +95,7 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
 }
 
 impl<B: UsbBus> ServedPort for UsbPort<'_, B> {
-    /// For bus interrupts, queued bytes, and at least every second.
+    /// Must be called at bus interrupts, for queued bytes, and at least every second.
     fn serve(&mut self, now_us: u32) -> u32 {
         if self.is_off && now_us.wrapping_sub(self.moved_us) < OFF_US {
             return 0;
@@ -106,7 +107,7 @@ impl<B: UsbBus> ServedPort for UsbPort<'_, B> {
         self.device.poll(&mut [&mut self.serial]);
         let lost = self.receive();
         let was_open = core::mem::replace(&mut self.is_open, self.serial.dtr());
-        // Old lines would mislead a new terminal.
+        // Queued lines are dropped, since old ones would mislead a new terminal.
         let is_absent = matches!(self.device.state(), UsbDeviceState::Default | UsbDeviceState::Addressed);
         if is_absent || self.is_open && !was_open {
             self.waiting.clear();

@@ -8,9 +8,9 @@ use crate::event::event;
 use core::marker::PhantomData;
 use embedded_hal::delay::DelayNs;
 
-/// For a burst or its processing; usual: below a millisecond.
+/// Limit for a burst or its processing, µs; usually below a millisecond.
 const SAMPLING_US: u64 = 2_000_000;
-/// For room in the transmit queue; it empties in 60 ms.
+/// Limit for room in the transmit queue, µs; the queue empties in 60 ms.
 const REPORT_US: u64 = 10_000_000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,16 +21,16 @@ enum StoppedTask {
     Reports,
 }
 
-/// Compares task counters between passes; missing edges concern the sensor.
+/// Compares task counters between passes. Missing edges are the sensor's fault and do not count.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TaskMonitor {
     activity: SamplingActivity,
     reading_since_us: Option<u64>,
     processed: u32,
-    /// At the last change of `processed`.
+    /// Bursts that had ended when `processed` last changed.
     ended_then: u32,
     behind_since_us: Option<u64>,
-    /// Last time with room, or nothing to send.
+    /// Last time at which the queue had room or nothing was to be sent, µs.
     transmitted_us: u64,
     stopped: Option<StoppedTask>,
 }
@@ -44,7 +44,7 @@ impl TaskMonitor {
         self.transmitted_us = now_us;
     }
 
-    /// Sampling, estimators and reports; logs the first stop once.
+    /// True if sampling, estimators and reports are alive; logs the first stop once.
     pub(crate) fn are_alive(&mut self, board: &mut impl Board) -> bool {
         let (now_us, activity) = (board.now_us(), board.sampling_activity());
         let processed = board.estimators(|estimators| estimators.processed());
@@ -57,7 +57,7 @@ impl TaskMonitor {
         stopped.is_none()
     }
 
-    /// By sampling activity and processed bursts.
+    /// Finds a stopped task from the sampling activity and the number of processed bursts.
     fn find_stopped(&mut self, now_us: u64, activity: SamplingActivity, processed: u32) -> Option<StoppedTask> {
         if activity.started == activity.ended || activity.started != self.activity.started {
             self.reading_since_us = None;
@@ -83,11 +83,11 @@ impl TaskMonitor {
 
 /// The watchdog of a microcontroller.
 pub trait Watchdog: MicrosecondCounter {
-    /// Prolongs its time.
+    /// Restarts the watchdog's time.
     fn feed();
 }
 
-/// Feeds only if the microsecond counter has advanced: without it no wait ends.
+/// Feeds the watchdog only if the microsecond counter has advanced: without the counter no wait ends.
 pub struct Feeder<M> {
     fed_at: u32,
     microcontroller: PhantomData<M>,
@@ -109,7 +109,7 @@ impl<M: Watchdog> Feeder<M> {
     }
 }
 
-/// Feeds while waiting.
+/// A delay that feeds the watchdog while it waits.
 pub struct FeedingDelay<'a, M>(pub &'a mut Feeder<M>);
 
 impl<M: Watchdog> DelayNs for FeedingDelay<'_, M> {
@@ -125,7 +125,7 @@ impl<M: Watchdog> DelayNs for FeedingDelay<'_, M> {
     }
 }
 
-/// A periodic interrupt feeds a short watchdog for some ticks after the main loop.
+/// Lets a periodic interrupt feed a short watchdog for some ticks after the main loop has fed it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WatchdogExtension {
     feedings: u32,
@@ -133,10 +133,11 @@ pub struct WatchdogExtension {
 }
 
 impl WatchdogExtension {
-    /// Before the first feeding.
+    /// The state before the first feeding.
     pub const START: Self = Self { feedings: 0, ticks_left: 0 };
 
-    /// For each tick, with the main loop's feedings; true to feed, for `ticks` after each.
+    /// To be called at each tick with the number of the main loop's feedings. True, for `ticks` after each, if the
+    /// watchdog is to be fed.
     pub fn tick(&mut self, feedings: u32, ticks: u32) -> bool {
         self.ticks_left = if feedings == self.feedings { self.ticks_left.saturating_sub(1) } else { ticks };
         self.feedings = feedings;
@@ -152,7 +153,7 @@ mod tests {
     const MS: u64 = 1000;
     const PERIOD_US: u64 = 5 * MS;
 
-    /// Passes every 5 ms for 20 s; first stopped task and time.
+    /// Runs a pass every 5 ms for 20 s; returns the first stopped task and the time.
     fn first_stop(transmitting: bool, at: impl Fn(u32) -> (SamplingActivity, u32)) -> Option<(StoppedTask, u64)> {
         let mut monitor = TaskMonitor::new(0);
         (0..4000_u32).find_map(|pass| {
@@ -174,7 +175,7 @@ mod tests {
         assert_eq!(first_stop(true, |pass| (ended(pass), pass)), None);
         assert_eq!(first_stop(true, |_| (ended(7), 7)), None, "no edges");
         assert_eq!(first_stop(true, |pass| (ended(u32::MAX - 5).after(pass), pass)), None, "counters wrap");
-        // One burst in 10 s.
+        // One burst comes in 10 s.
         let slow = |pass: u32| {
             let bursts = pass / 2000;
             match pass % 2000 {
@@ -228,7 +229,7 @@ mod tests {
 
     const STOPPED_READINGS: u32 = 10_000;
     static READINGS: AtomicU32 = AtomicU32::new(0);
-    /// While the counter stands still, and after.
+    /// Number of feedings while the counter stands still, and after.
     static FEEDINGS: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
 
     impl MicrosecondCounter for StoppedCounter {

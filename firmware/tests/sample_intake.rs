@@ -13,8 +13,8 @@ const PERIOD_US: f64 = 1e6 / 819.2;
 /// The supply in counts of 2.418 mV: 5.00 V.
 const SUPPLY: i16 = 2068;
 
-/// Samples that the default filter, of 2^2 taps a stage, mixes with what was before: 2N = 8, and 6.2 ms for the analogue part,
-/// 5.1 periods and the one that they begin in.
+/// Samples that the default filter, of 2^2 taps a stage, mixes with earlier ones: 2N = 8, and 6.2 ms of the analogue part, which is 5.1
+/// periods and one begun.
 const SETTLING: u32 = 8 + 6;
 /// Samples after the first probe from which the gate against gross errors learns the noise.
 const LEARNING: u32 = 32;
@@ -33,7 +33,7 @@ fn timed(period: u32, burst: Option<Burst>) -> TimedBurst {
     TimedBurst { at_us: at_us(period), dropped: 0, burst }
 }
 
-/// The sums worked out by hand: counts 0, 1, 3 have first differences 1, 2, whose squares sum to 5.
+/// Sums worked out by hand: counts 0, 1, 3 have first differences 1, 2, whose squares sum to 5.
 #[test]
 fn counts_reach_the_estimators() {
     let mut statistics = Statistics::new();
@@ -53,7 +53,7 @@ fn counts_reach_the_estimators() {
     assert_eq!(sums(Channel::Supply), (3, (0, 2)));
 }
 
-/// No difference is taken across a lost sample: of 1, lost, 5, 9 only the step from 5 to 9 counts.
+/// No difference spans a lost sample: of 1, lost, 5, 9 only the step from 5 to 9 counts.
 #[test]
 fn losses_are_gaps_and_are_counted_by_cause() {
     let zeros = Some(Burst::from_bytes(&[0; BURST_BYTES]));
@@ -79,7 +79,7 @@ fn losses_are_gaps_and_are_counted_by_cause() {
     }
 }
 
-/// The burst of an edge between two samples is not used, and no sample is missing.
+/// The burst at an edge between two samples is not used, and no sample counts as missing.
 #[test]
 fn a_spurious_edge_is_no_sample() {
     let mut statistics = Statistics::new();
@@ -92,7 +92,7 @@ fn a_spurious_edge_is_no_sample() {
     assert_eq!(estimators.health().spurious_edges, 1);
 }
 
-/// After a silence in which the sensor may have been reset its samples are not used until it is probed.
+/// The sensor may have been reset during a silence, so its samples are not used until it is probed.
 #[test]
 fn after_a_silence_samples_are_not_used_before_the_probe() {
     let mut statistics = Statistics::new();
@@ -150,7 +150,7 @@ fn a_full_queue_is_counted_with_the_next_burst_that_fits() {
     assert_eq!(queued(3), [(1_000_000, 7), (1_001_000, 0)]);
 }
 
-/// The raw stream contains every burst, usable or not, with its sample number and time; lost ones leave a gap in the numbers.
+/// The raw stream contains every burst, usable or not, with its sample number and time. Lost bursts leave a gap in the numbers.
 #[test]
 fn the_raw_stream_contains_every_burst() {
     let (mut bursts, mut buffer, mut statistics) = (BurstQueue::new(), TransmitBuffer::new(), Statistics::new());
@@ -248,7 +248,7 @@ fn health_after(bursts: impl IntoIterator<Item = Burst>) -> Health {
 
 #[test]
 fn damaged_bursts_are_counted_by_cause() {
-    // Beyond ±7000 counts of 0.05 deg/s the part cannot measure.
+    // The sensor cannot measure beyond ±7000 counts of 0.05 deg/s.
     let damaged = [
         with_rate(1),
         with_rate(7_001),
@@ -263,8 +263,8 @@ fn damaged_bursts_are_counted_by_cause() {
     assert_eq!((health.impossible_rate, health.shifted, health.frozen, health.x_sign), (2, 1, 0, 0), "{health:?}");
 }
 
-/// The default filter of two averages of four samples is eight samples long: the 33rd of equal bursts is the first with four
-/// lengths of it before it. After 16 more the sensor is in trouble.
+/// The default filter of two averages of four samples is eight samples long. The 33rd equal burst is the first after four filter lengths of
+/// equal ones. After 16 more the sensor is in trouble.
 #[test]
 fn a_frozen_sensor_is_counted() {
     let health = health_after(core::iter::repeat_n(with_rate(1), 600));
@@ -285,7 +285,8 @@ fn samples_after(bursts: &[Burst]) -> [(u64, u64); CHANNELS.len()] {
     })
 }
 
-/// A rate that the sensor cannot measure is missing in that gyro, and a word that was not refreshed in its channel.
+/// A rate that the sensor cannot measure is missing in that gyro only, and a word that was not refreshed in its channel
+/// only.
 #[test]
 fn a_sample_that_is_refused_in_one_channel_is_missing_in_that_channel_alone() {
     let mut stale = with_rate(2);
@@ -296,7 +297,8 @@ fn a_sample_that_is_refused_in_one_channel_is_missing_in_that_channel_alone() {
     assert_eq!(samples, expected);
 }
 
-/// 4.70 V, as from a USB port, with the error flag that the sensor sets then: a warning in every burst, and no sample is lost.
+/// The supply is 4.70 V, as from a USB port, with the error flag that the sensor sets then. Each burst has a warning, and no sample is
+/// lost.
 #[test]
 fn a_low_supply_and_the_error_flag_mark_samples_and_refuse_none() {
     let low = |k: i16| {
@@ -358,7 +360,7 @@ fn samples_that_the_filter_mixes_with_a_self_test_are_a_gap() {
         let mut filter = Filter::new(1 << taps_log2);
         let (tests, mut period) = (5, 0);
         for _ in 0..tests {
-            // The test takes 12 ms, in which nothing is read.
+            // The test takes 12 ms, in which no burst is read.
             for _ in 0..10 {
                 filter.push(800.0);
                 period += 1;
@@ -366,7 +368,7 @@ fn samples_that_the_filter_mixes_with_a_self_test_are_a_gap() {
             estimators.accept_samples_after_settling(at_us(period) - 1);
             for _ in 0..1638 {
                 let mut counts = AT_REST;
-                // So that the sensor does not look frozen.
+                // Changing counts keep the sensor from looking frozen.
                 counts[2] = (period % 7) as i16;
                 counts[1] = filter.push(0.0).round() as i16;
                 estimators.process(timed(period, Some(Burst::from_counts(&Counts::new(counts)))), 0);
@@ -381,8 +383,8 @@ fn samples_that_the_filter_mixes_with_a_self_test_are_a_gap() {
     }
 }
 
-/// The clock of a part is within 3 % of its nominal rate (data sheet Rev. B, Table 1). The same counts from a part that is 3 %
-/// slow have averaging times 3 % longer, and with white noise N is larger by the root of that.
+/// A part's clock is within 3 % of its nominal rate (data sheet Rev. B, Table 1). If it is 3 % slow, the averaging times of the same counts
+/// are 3 % longer, and with white noise N is larger by the root of that.
 #[test]
 fn averaging_times_are_by_the_measured_rate() {
     let config = Config::default();
@@ -408,7 +410,7 @@ fn averaging_times_are_by_the_measured_rate() {
     assert!((ratio / (1.0_f64 / 0.97).sqrt() - 1.0).abs() < 1e-3, "{ratio}");
 }
 
-/// Sixteen edges in a millisecond, 13 times as many as a sensor can give, whether sampling is enabled or not.
+/// Sixteen edges in a millisecond, 13 times a sensor's rate, mask the line whether sampling is enabled or not.
 #[test]
 fn an_oscillating_line_is_to_be_masked() {
     for enabled in [true, false] {
@@ -454,14 +456,14 @@ fn bit_errors_leave_n_within_its_bounds() {
     }
     let health = estimators.health();
     println!("{flips} flips; {health:?}");
-    // Rounding to counts adds 1/12.
+    // Rounding to counts adds a variance of 1/12.
     let truth = 0.05 * (SIGMA * SIGMA + 1.0 / 12.0).sqrt() / 204.8_f64.sqrt();
     for (index, lsb) in [(0, 1.0), (1, 1.0), (2, 1.0), (3, 3.33e-3 / 0.05), (4, 3.33e-3 / 0.05), (5, 3.33e-3 / 0.05)] {
         let sums = ChannelSums::from_estimator(estimators.channel(index).unwrap());
         let n = sums.fit_baseline(CHANNELS[index], estimators.scale()).terms()[0];
         let truth = truth * lsb;
         println!("{:?}: N {:.6} ({:.6} to {:.6}), truth {truth:.6}", CHANNELS[index], n.value, n.low, n.high);
-        // 95 % bounds of six channels: half as wide again for all of them together.
+        // The 95 % bounds are widened by half, so that they hold for six channels together.
         let (low, high) = (1.5 * n.low - 0.5 * n.value, 1.5 * n.high - 0.5 * n.value);
         assert!((low..high).contains(&truth), "{:?}: {n:?}, truth {truth}", CHANNELS[index]);
     }
@@ -488,8 +490,8 @@ fn random_walk_with_errors(errors: &[(u32, i16)]) -> (FittedTerm, Health) {
     (sums.fit_baseline(CHANNELS[0], estimators.scale()).terms()[0], estimators.health())
 }
 
-/// A flipped bit of 4,096 counts in any of the first 300 samples after a start, or another one within sixteen samples of it, leaves N
-/// within its bounds: it is in the samples that are not used, or refused.
+/// A bit of 4,096 counts is flipped in any of the first 300 samples after a start, and another within sixteen samples. N stays within its
+/// bounds, since these samples are not used or are refused.
 #[test]
 fn gross_errors_after_a_start_and_close_together_leave_n_within_its_bounds() {
     let (sound, _) = random_walk_with_errors(&[]);
@@ -498,9 +500,10 @@ fn gross_errors_after_a_start_and_close_together_leave_n_within_its_bounds() {
     for errors in single.chain(pairs) {
         let (found, health) = random_walk_with_errors(&errors);
         assert!((sound.low..sound.high).contains(&found.value), "{errors:?}: {found:?}, without {sound:?}");
-        let unused = 2 + 2 + LEARNING; // 2N, and 6.2 ms
+        let unused = 2 + 2 + LEARNING; // 2N, and 6.2 ms of the analogue part
         let expected = errors.iter().filter(|&&(at, _)| at > unused).count() as u32;
-        // After an error in the last settling sample, the level to compare with, the next two are refused.
+        // The last settling sample is the level to compare with: after an error in it, the next two samples are
+        // refused.
         let spare = 2 * u32::from(errors[0].0 == unused);
         assert!((expected..=expected + spare).contains(&health.gross_errors), "{errors:?}: {health:?}");
     }

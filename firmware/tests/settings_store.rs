@@ -1,5 +1,4 @@
-//! Settings in flash memory, with the power cut at every word of every write: what is read afterwards is the record of before or
-//! the new one, never neither.
+//! Settings in flash memory, with the power cut at every word of every write. Afterwards either the old record or the new one is read.
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use firmware::settings_store::{MAX_RECORD, SettingsStore};
@@ -16,9 +15,9 @@ struct MockFlash<const PAGE: usize, const PAGES: usize> {
     ignores_writes: bool,
 }
 
-/// Four sectors as those of the Pico's flash.
+/// Four sectors of the size of the Pico's flash.
 type SmallFlash = MockFlash<4096, 4>;
-/// What the memory maps give the settings on a Pico, and on an STM32F405.
+/// The memories that the memory maps leave for the settings on a Pico and on an STM32F405.
 type PicoFlash = MockFlash<4096, 16>;
 type Stm32Flash = MockFlash<{ 128 << 10 }, 2>;
 
@@ -145,7 +144,7 @@ fn power_cut_at_every_word_leaves_the_old_or_the_new_record() {
                 found if found == before => old_found += 1,
                 found => panic!("write {number} cut after {words_left} words left {:?} bytes", found.map(|r| r.len())),
             }
-            // The next write, after power has come back, finds its place.
+            // The next write, after power has come back, finds a place.
             let (again, done) = cut.write_record(&new);
             assert!(
                 done && again.read_record().as_ref() == Some(&new),
@@ -163,7 +162,7 @@ fn power_cut_at_every_word_leaves_the_old_or_the_new_record() {
     assert!(migrations >= 2 * flash.erased.len() as u32, "the ring has come round twice");
 }
 
-/// Memory that holds something else, as that of another program, is no record, and takes one.
+/// Memory with other content, as of another program, has no record, and a record can be written to it.
 #[test]
 fn foreign_contents_are_no_record() {
     let mut flash = SmallFlash::new();
@@ -176,7 +175,7 @@ fn foreign_contents_are_no_record() {
     assert_eq!(flash.read_record(), None);
 }
 
-/// Pages that are taken for a ring, in which nothing that is written is found again.
+/// Some pages look like a full ring, in which a written record is not found again.
 #[test]
 fn contents_that_hide_what_is_written_are_erased() {
     let contents = include_bytes!("../../tests/fuzz/corpus/settings/item-that-hides-others");
@@ -190,7 +189,7 @@ fn contents_that_hide_what_is_written_are_erased() {
     assert_eq!(flash.read_record(), Some(record(1)));
 }
 
-/// Damage that has its checksums: an item of no bytes behind the record (crate `sequential-storage`: checksum of the data, their length,
+/// The damage has valid checksums: an item of no bytes follows the record (crate `sequential-storage`: checksum of the data, their length,
 /// checksum of the length).
 #[test]
 fn an_item_of_no_bytes_is_no_record() {
@@ -204,15 +203,15 @@ fn an_item_of_no_bytes_is_no_record() {
     assert_eq!(flash.read_record(), Some(record(2)));
 }
 
-/// Flash that does not take what is written, as that of a part whose store the debugger has locked, or that of an emulator.
+/// The flash does not take what is written, as when a debugger has locked it, or in an emulator.
 #[test]
-fn what_is_not_there_afterwards_is_not_called_written() {
+fn a_record_that_is_not_read_back_is_not_called_written() {
     let mut flash = SmallFlash::new();
     flash.ignores_writes = true;
     let (flash, done) = flash.write_record(&record(1));
     assert!(!done);
     assert_eq!(flash.read_record(), None);
-    // An erasure takes seconds, and the samples of that time.
+    // An erasure would take seconds, in which samples are lost.
     assert_eq!(flash.erased, [0; 4]);
 }
 
@@ -220,7 +219,7 @@ fn what_is_not_there_afterwards_is_not_called_written() {
 const PICO_ENDURANCE: f64 = 100_000.0;
 const STM32_ENDURANCE: f64 = 10_000.0;
 
-/// Wear, by the number of erasures that writes of the longest record cost: the figures that the documentation gives.
+/// Wear as the number of erasures by writes of the longest record; the documentation gives these figures.
 #[test]
 fn sectors_are_erased_evenly_and_rarely() {
     println!(

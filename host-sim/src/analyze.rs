@@ -1,4 +1,4 @@
-//! `analyze` and `replay`: the report of a recording in a file, or of each of its sensors.
+//! `analyze` and `replay`: the report of a recording, or of each sensor of a file.
 
 use crate::cli::{AnalyzeArguments, InputArguments, OutputArguments, RecordingArguments, ReplayArguments};
 use crate::inspect::{self, read_or_ask};
@@ -29,12 +29,12 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
+/// Most rows that a quick report keeps in memory; they give the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
 /// Longest profile file.
 const PROFILE_BYTES: u64 = 1 << 20;
 
-/// Analyses the recording of the arguments and writes its report, or what each of its sensors has.
+/// Analyses the recording of the arguments and writes its report, or the reports of its sensors.
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let AnalyzeArguments { recording, each_sensor, quick, output } = arguments;
     let sensor = recording.input.sensor.as_deref().map(Path::new);
@@ -71,27 +71,27 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     Incomplete::check(reading.are_complete())
 }
 
-/// Recordings that are read one after the other.
+/// Reads recordings one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct SeveralReadings {
     incomplete: usize,
 }
 
 impl SeveralReadings {
-    /// All samples of a recording in memory.
+    /// Reads all samples of a recording into memory.
     pub(crate) fn read(&mut self, recording: &RecordingArguments) -> Result<Measurement> {
         let read = read_or_ask(recording, open_measured)?;
         self.incomplete += usize::from(!read.rows_read().is_complete());
         Ok(read.into_beginning())
     }
 
-    /// Whether all of them were read to their end.
+    /// True if all recordings were read to their end.
     pub(crate) fn are_complete(&self) -> bool {
         self.incomplete == 0
     }
 }
 
-/// Whether recordings of one file are parts of one sensor: no two have a channel in common.
+/// True if recordings of one file are parts of one sensor: no two have a channel in common.
 fn are_parts(recordings: &[Measurement]) -> bool {
     let names = |of: &Measurement| of.channels.iter().map(|channel| channel.profile.name).collect::<Vec<_>>();
     let all: Vec<Vec<&str>> = recordings.iter().map(names).collect();
@@ -124,16 +124,17 @@ fn write_parts(
     targets.into_iter().map(write).fold(Ok(()), Result::and)
 }
 
-/// What tells a sensor from the others of its file: its topic, or its columns.
+/// The name of a sensor among the others of its file: its topic, or its columns.
 fn sensor_name(recording: &RecordingArguments) -> String {
     let InputArguments { topic, columns, .. } = &recording.input;
     topic.clone().unwrap_or_else(|| columns.join(" "))
 }
 
-/// Is called with a recording that was read, and with what the user should know of it, before it is analysed.
+/// Called after a recording was read and before it is analysed, with notes for the user.
 type EndReading<'a> = dyn FnMut(&SampleStream, &[String]) + 'a;
 
-/// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
+/// The report of a recording, with a progress bar. If the reading is interrupted, the report is of the samples read
+/// until then.
 pub(crate) fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
@@ -149,8 +150,8 @@ pub(crate) fn watched_report(recording: &RecordingArguments, is_quick: bool) -> 
     report(recording, is_quick, &monitor, &mut end_reading)
 }
 
-/// The report of a recording, with the longest part at rest of its file where the platform moved; `end_reading` is called when it was
-/// read, before it is analysed.
+/// The report of a recording. If the platform moved, it is of the longest part at rest. `end_reading` is called after the recording was
+/// read and before it is analysed.
 pub(crate) fn report(
     recording: &RecordingArguments,
     is_quick: bool,
@@ -186,7 +187,7 @@ fn report_of_samples(
         end_reading(stream, &notes);
         reading = reading_record(stream, file(), recording.options(false), notes.clone());
     })?;
-    // The hash is made while the samples are analysed.
+    // The hash is computed while the samples are analysed.
     Ok(Analysed { report, reading: Some(ReadingRecord { sha256: finished(hash), ..reading }) })
 }
 
@@ -194,7 +195,7 @@ fn finished(hash: Option<FileHash>) -> Option<String> {
     hash.and_then(|hash| hash.finish().ok())
 }
 
-/// The report of all samples of `stream`; `end_reading` is called when they were read, before they are analysed.
+/// The report of all samples of `stream`. `end_reading` is called after they were read and before they are analysed.
 fn analyze_stream(stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStream)) -> Result<Report> {
     let samples = ReadSamples::read(stream, end_reading)?;
     Ok(progress::analysing(|watch| samples.analyze(watch)))
@@ -204,14 +205,14 @@ fn note_all(notes: &[String]) {
     notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
 }
 
-/// Opens a recording of any format, or the part of it that the arguments say.
+/// Opens a recording of any format, or the part of it that the arguments select.
 fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<OpenStream> {
     let reading = Reading::new(recording.rate, kept).of_part(recording.time_range());
     let opened = open(&recording.input, monitor)?.into_stream(reading);
     opened.map_err(|error| named(error, &recording.input.file))
 }
 
-/// All samples of a recording in memory. What the user should know is noted.
+/// Reads all samples of a recording into memory, and prints notes for the user.
 fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
     let OpenStream { stream, notes, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
     note_all(&notes);
@@ -219,8 +220,8 @@ fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
     Ok(stream)
 }
 
-/// Analyses what the driver reads of a table of register counts or a frame log over the emulated bus; false if the file
-/// ends early.
+/// Replays a table of register counts or a frame log over the emulated bus, and analyses what the driver reads; false if the
+/// file ends early.
 pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<(Report, bool)> {
     let ReplayArguments { file, rate, range, output: _ } = arguments;
     let input = RecordedInput::open(file)?;
@@ -254,15 +255,16 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<OpenRecordi
     OpenRecording::new(input, OpenOptions { sensor, selection, topic: topic.clone(), range })
 }
 
-/// A recording to write anew.
+/// A recording to be written in another format.
 pub(crate) enum Recorded {
     /// Register counts of an ADIS16405.
     Counts(Recording),
-    /// Numbers of any sensor, which are read when they are written.
+    /// Numbers of any sensor; they are read while they are written.
     AnySensor(RecordedInput, Box<ReadOptions>),
 }
 
-/// Opens a file of any format to write it anew; register counts are read, or the part of them that the arguments say.
+/// Opens a file of any format to write it anew. Register counts are read, or the part of them that the arguments
+/// select.
 pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
     let (rate, part) = (arguments.rate, arguments.time_range());
     Ok(match open(&arguments.input, &ReadMonitor::default())? {
@@ -283,12 +285,12 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
     })
 }
 
-/// The samples of a recording of any format on their time base. What the user should know is noted.
+/// Reads the samples of a recording of any format on their time base, and prints notes for the user.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
     Ok(open_measured(arguments)?.into_beginning())
 }
 
-/// The profile of a known sensor, or of a profile file; `range` is that of an ADIS16405's gyros.
+/// The profile of a known sensor, or of a profile file; `range` is the gyro range of an ADIS16405.
 fn sensor_profile(name: &str, range: GyroRange) -> Result<SensorProfile> {
     if let Some(known) = profile_file::by_name(name, range.lsb()) {
         return Ok(known);

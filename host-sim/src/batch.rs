@@ -1,4 +1,4 @@
-//! `batch`: one report a recording, of many files or of the folders that hold them, as many at a time as there are cores.
+//! `batch`: one report per recording, for many files or folders, with one analysis per core at a time.
 
 use crate::analyze::report;
 use crate::cli::{BatchArguments, RecordingArguments};
@@ -31,15 +31,15 @@ struct Work {
 /// A recording that has a report, or the reason why it has none.
 enum Outcome {
     Reported(Box<Analysed>),
-    /// Its report is there already.
+    /// The report exists already.
     Kept,
     Failed(String),
 }
 
-/// Writes the report of each recording. One that cannot be analysed does not keep the others from it.
+/// Writes the report of each recording. A recording that cannot be analysed does not stop the others.
 ///
 /// # Errors
-/// Two would have one report, a file cannot be written, or a recording could not be analysed.
+/// Two recordings would have one report, a file cannot be written, or a recording could not be analysed.
 pub(crate) fn run(arguments: &BatchArguments) -> Result<()> {
     let BatchArguments { recording, more, each_sensor, quick, output, resume, rows: of_rows, jobs, quiet, force } =
         arguments;
@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &BatchArguments) -> Result<()> {
         let files = if is_folder { files_below(folder)? } else { vec![folder.clone()] };
         ensure!(!files.is_empty(), "{}: no file in it", folder.display());
         for file in files {
-            // The folders of the reports are those of the recordings.
+            // The folders of the reports mirror those of the recordings.
             let below = file.strip_prefix(folder).ok().filter(|_| is_folder).and_then(Path::parent);
             let of_file = recording.of_file(&file);
             let sensors = if *each_sensor { inspect::each_sensor(&of_file)? } else { vec![of_file] };
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &BatchArguments) -> Result<()> {
     conclude(&all, &outcomes, output, *quiet)
 }
 
-/// Says what has no report, and what was not read to its end.
+/// Names the recordings without a report, and those not read to their end.
 fn conclude(all: &[Work], outcomes: &[Outcome], out: &Path, is_quiet: bool) -> Result<()> {
     let (mut failed, mut incomplete, mut kept) = (0, 0, 0);
     for (work, outcome) in all.iter().zip(outcomes) {
@@ -116,7 +116,7 @@ fn conclude(all: &[Work], outcomes: &[Outcome], out: &Path, is_quiet: bool) -> R
     Ok(())
 }
 
-/// The files below a folder whose names do not begin with a dot, in the order of their names; of a bag of ROS 2 its folder.
+/// The files below a folder whose names do not begin with a dot, sorted by name. A bag of ROS 2 is its folder.
 fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
     let mut paths: Vec<PathBuf> = entries.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
@@ -134,7 +134,7 @@ fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Opens the file of the rows; they are added to what is there where the work is resumed.
+/// Opens the file of the rows. If the work is resumed, new rows are added to the existing ones.
 fn open_rows(file: &Path, resume: bool, outputs: &OutputFiles) -> Result<File> {
     outputs.check(file)?;
     let open = OpenOptions::new().create(true).write(true).append(resume).truncate(!resume).open(file);
@@ -156,7 +156,7 @@ fn analysed(work: &Work, is_quick: bool, resume: bool, outputs: &OutputFiles) ->
     analyse().unwrap_or_else(|error| Outcome::Failed(named(&work.recording.input.file, &error)))
 }
 
-/// Whether the report is there, of the same bytes, read in the same way by this version.
+/// True if the report exists and is of the same bytes, read in the same way by this version.
 fn is_up_to_date(work: &Work, is_quick: bool) -> Result<bool> {
     #[derive(Deserialize)]
     struct WithReading {
@@ -172,7 +172,7 @@ fn is_up_to_date(work: &Work, is_quick: bool) -> Result<bool> {
     Ok(input.begin_hash().and_then(|hash| hash.finish()).is_ok_and(|now| now == before))
 }
 
-/// Adds the rows of a recording; a report that is there has its rows from before.
+/// Adds the rows of a recording. An existing report has its rows in the file already.
 fn write_rows(recording: &RecordingArguments, outcome: &Outcome, table: &mut File) -> Result<()> {
     let file = recording.input.file.display().to_string();
     let name = recording.input.topic.as_ref().map_or_else(|| file.clone(), |topic| format!("{file}#{topic}"));
@@ -186,17 +186,17 @@ fn write_rows(recording: &RecordingArguments, outcome: &Outcome, table: &mut Fil
         serde_json::to_writer(&mut lines, row)?;
         lines.push(b'\n');
     }
-    // All of a recording at once: an end of the program leaves no part of it.
+    // All rows of a recording are written at once: if the program ends, no part of a recording remains.
     Ok(table.write_all(&lines)?)
 }
 
-/// An error with the name of its file before it, where it does not begin with it.
+/// An error with the name of its file in front, unless it begins with it.
 fn named(file: &Path, error: &anyhow::Error) -> String {
     let (name, text) = (file.display().to_string(), format!("{error:#}"));
     if text.starts_with(&name) { text } else { format!("{name}: {text}") }
 }
 
-/// The report of each recording, in its folder: the name of its file, and that of its sensor where one is named.
+/// The recordings with their reports. A report has the name of its file, and of its sensor if one is named.
 fn with_reports(recordings: Vec<(RecordingArguments, PathBuf)>) -> Result<Vec<Work>> {
     let mut known: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
     let mut all = Vec::with_capacity(recordings.len());
@@ -208,7 +208,7 @@ fn with_reports(recordings: Vec<(RecordingArguments, PathBuf)>) -> Result<Vec<Wo
             Some(stem) => stem,
         });
         let of_file = || recordings.iter().enumerate().filter(|(_, (other, _))| other.input.file == input.file);
-        // Each of several sensors of a file has its own name, or its number.
+        // If a file has several sensors, each report has the sensor's name, or its number.
         let sensor = match (of_file().count(), &input.topic) {
             (1, _) => String::new(),
             (_, Some(topic)) => {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 pub use observatory::bench::{BenchPlan, Cause, Check, Step, Transcript, checks, write_table};
 
-/// Time for which one of two ports is listened to.
+/// Time for which one of two ports is read before the other.
 const TURN: Duration = Duration::from_millis(1);
 
 /// A device to which commands are sent.
@@ -27,7 +27,7 @@ pub trait Console {
     fn next(&mut self, until_s: f64) -> io::Result<Option<Received>>;
     /// Counters of the decoder.
     fn counters(&self) -> DecoderCounters;
-    /// Messages of a second port since the last call; `None` without one.
+    /// Messages of the second port since the last call; `None` without one.
     fn second_port(&mut self) -> Option<Vec<Received>> {
         None
     }
@@ -36,13 +36,13 @@ pub trait Console {
 /// A device on one or two serial ports.
 pub struct SerialConsole<P> {
     link: SerialLink<P>,
-    /// A port to listen on, and what has come there.
+    /// The second port, and the messages that it has received.
     second: Option<(SerialLink<P>, Vec<Received>)>,
     opened: Instant,
 }
 
 impl<P: Read + Write> SerialConsole<P> {
-    /// A device on a port, and perhaps on a second one.
+    /// A device on a port, and a second one if given.
     pub fn new(link: SerialLink<P>, second: Option<SerialLink<P>>) -> Self {
         Self { link, second: second.map(|link| (link, Vec::new())), opened: Instant::now() }
     }
@@ -61,7 +61,7 @@ impl<P: Read + Write> Console for SerialConsole<P> {
         let until = self.opened + Duration::from_secs_f64(until_s);
         let Some((second, heard)) = &mut self.second else { return self.link.next(Some(until)) };
         while Instant::now() < until {
-            // Both are read in turn, before the system's buffer of 4 kB is full.
+            // Both ports are read in turn, before the system's buffer of 4 kB is full.
             heard.extend(second.next(Some(Instant::now() + TURN))?);
             if let Some(received) = self.link.next(Some(Instant::now() + TURN))? {
                 return Ok(Some(received));
@@ -82,7 +82,7 @@ impl<P: Read + Write> Console for SerialConsole<P> {
     }
 }
 
-/// Goes through the steps, and then sets what it has changed as it was. `progress` is called before each step.
+/// Runs the steps, and then restores the settings that it has changed. `progress` is called before each step.
 ///
 /// # Errors
 /// The port fails.

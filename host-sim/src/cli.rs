@@ -29,14 +29,14 @@ const NOISE: &str = "Noise, effects and faults";
 /// Heading of the options that say where the result goes.
 const OUTPUT: &str = "Output";
 
-/// Below the options of the program; each line is a command.
+/// Examples in the help of the program; each line is a command.
 const EXAMPLES: &str = "\
 Examples:
   imunoise imu.bag -o report.html            a recording of any inertial sensor
   imunoise demo                              an hour of the virtual sensor
   imunoise monitor /dev/ttyACM0              a device that runs the firmware";
 
-/// Below those of the long help.
+/// Exit codes in the long help of the program.
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done
@@ -47,20 +47,20 @@ Exit codes:
 Colour is left out if NO_COLOR is set. `imunoise COMMAND --help` has the units
 and examples of the options; `-h` has one screen.";
 
-/// Below the options of `analyze`.
+/// Examples in the help of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
   imunoise analyze flight.ulg -o report.html -o imu.yaml
   imunoise analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
   imunoise analyze run1.csv.gz --rate 100 -o report.json";
 
-/// Below the options of `batch`.
+/// Examples in the help of `batch`.
 const EXAMPLES_OF_BATCH: &str = "\
 Examples:
   imunoise batch recordings -o reports --rows rows.ndjson
   imunoise batch a.csv.gz b.csv.gz -o reports --rate 100 -j 4 --resume";
 
-/// Below the options of `demo`.
+/// Examples in the help of `demo`.
 const EXAMPLES_OF_DEMO: &str = "\
 The page is report.html, unless -o names another file.
 
@@ -68,13 +68,13 @@ Examples:
   imunoise demo
   imunoise demo --seconds 600 --plain -o hour.html";
 
-/// Below the options of `inspect`.
+/// Examples in the help of `inspect`.
 const EXAMPLES_OF_INSPECT: &str = "\
 Examples:
   imunoise inspect imu.bag
   imunoise inspect flight.ulg --topic sensor_gyro:1";
 
-/// Below the options of `compare`.
+/// Examples in the help of `compare`.
 const EXAMPLES_OF_COMPARE: &str = "\
 Examples:
   imunoise compare run1.csv.gz run2.csv.gz --rate 100
@@ -82,31 +82,31 @@ Examples:
   imunoise compare before.json after.json
   imunoise compare report.json --data-sheet";
 
-/// Below the options of `export`.
+/// Examples in the help of `export`.
 const EXAMPLES_OF_EXPORT: &str = "\
 Examples:
   imunoise export report.json -o imu.yaml
   imunoise export gyro.csv accel.csv --rate 200 -o openvins=chain.yaml";
 
-/// Below the options of `convert`.
+/// Examples in the help of `convert`.
 const EXAMPLES_OF_CONVERT: &str = "\
 Examples:
   imunoise convert flight.ulg still.csv.gz --from 8.2 --to 60
   imunoise convert imu.bag imu.npy";
 
-/// Below the options of `monitor`.
+/// Examples in the help of `monitor`.
 const EXAMPLES_OF_MONITOR: &str = "\
 Examples:
   imunoise monitor /dev/ttyACM0
   imunoise monitor /dev/ttyACM0 --send \"f 819.2\" --seconds 60";
 
-/// Below the options of `record`.
+/// Examples in the help of `record`.
 const EXAMPLES_OF_RECORD: &str = "\
 Examples:
   imunoise record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
   imunoise record night.csv.gz --port COM4 --seconds 28800 -o report.html";
 
-/// Below the options of `bench`.
+/// Examples in the help of `bench`.
 const EXAMPLES_OF_BENCH: &str = "\
 The sensor must be still. Two minutes; the statistics are reset, the settings
 kept. docs/bench.md has what to do with an oscilloscope.
@@ -118,19 +118,19 @@ Examples:
 /// Length of a recording of a device if none is given, s.
 const DEFAULT_S: f64 = 60.0;
 
-/// Below the options of `replay`.
+/// Examples in the help of `replay`.
 const EXAMPLES_OF_REPLAY: &str = "\
 Examples:
   imunoise replay counts.csv.gz --rate 100
   imunoise replay bus.csv.gz -o report.json";
 
-/// Below the options of `simulate`.
+/// Examples in the help of `simulate`.
 const EXAMPLES_OF_SIMULATE: &str = "\
 Examples:
   imunoise simulate hour.csv.gz --noise gyro=0.037,0.009,0.0013
   imunoise simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
 
-/// Below the options of `completions`.
+/// Examples in the help of `completions`.
 const EXAMPLES_OF_COMPLETIONS: &str = "\
 Examples:
   imunoise completions bash";
@@ -145,13 +145,13 @@ pub(crate) struct Cli {
     pub(crate) command: Command,
 }
 
-/// The words with `analyze` before the recording, where that comes first.
+/// Puts `analyze` before the recording if that comes first.
 pub(crate) fn with_subcommand(mut words: Vec<OsString>) -> Vec<OsString> {
     let program = Cli::command();
     let is_recording = words.get(1).is_some_and(|word| {
         let name = word.to_string_lossy();
         let is_known = program.get_subcommands().any(|known| known.get_name() == name) || name == "help";
-        // A misspelt subcommand is none.
+        // A misspelt subcommand is not taken for a recording.
         let is_path = name == "-" || name.contains(['.', '/', '\\']) || Path::new(word).exists();
         !is_known && is_path && (name == "-" || !name.starts_with('-'))
     });
@@ -170,10 +170,10 @@ pub(crate) enum Command {
     /// Simulate an hour of the virtual sensor and analyse it
     #[command(after_help = EXAMPLES_OF_DEMO)]
     Demo {
-        /// What is simulated.
+        /// Time and noise of the virtual sensor.
         #[command(flatten)]
         simulate: SimulationArguments,
-        /// Where the report goes besides the terminal.
+        /// Outputs of the report besides the terminal.
         #[command(flatten)]
         output: OutputArguments,
     },
@@ -214,7 +214,7 @@ pub(crate) enum Command {
         /// Length of the recording, s.
         #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true, value_parser = duration)]
         seconds: f64,
-        /// Where the report goes besides the terminal.
+        /// Outputs of the report besides the terminal.
         #[command(flatten)]
         output: OutputArguments,
     },
@@ -250,7 +250,7 @@ pub(crate) struct AnalyzeArguments {
     /// findings, for recordings of days.
     #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
-    /// Where the report goes besides the terminal.
+    /// Outputs of the report besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }
@@ -290,7 +290,7 @@ pub(crate) struct ReplayArguments {
     /// it: a count is 0.05, 0.025 or 0.0125 deg/s.
     #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
-    /// Where the report goes besides the terminal.
+    /// Outputs of the report besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }
@@ -319,7 +319,7 @@ pub(crate) struct CompareArguments {
     /// names. A recording is analysed first.
     #[arg(verbatim_doc_comment, long, conflicts_with = "more")]
     pub(crate) data_sheet: bool,
-    /// Where the result goes besides the terminal.
+    /// Output of the result besides the terminal.
     #[command(flatten)]
     pub(crate) result: JsonArgument,
 }
@@ -546,16 +546,16 @@ pub(crate) struct ExportArguments {
 const PROPOSED: [&str; 10] =
     ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "accept-guess", "each-sensor"];
 
-/// The words that were typed, the name of the program first.
+/// The words of the command line, with the program's name first.
 static TYPED: OnceLock<Vec<String>> = OnceLock::new();
 
-/// Keeps the words that were typed, for commands that are proposed.
+/// Keeps the words of the command line, for commands that are proposed.
 pub(crate) fn set_typed(words: &[OsString]) {
     // A process runs one command.
     let _ = TYPED.set(words.iter().map(|word| word.to_string_lossy().into_owned()).collect());
 }
 
-/// The options that were typed for `analyze`, without those that a proposed command states itself.
+/// The options that were given to `analyze`, without those that a proposed command states itself.
 pub(crate) fn other_options() -> Vec<String> {
     let mut program = Cli::command();
     let typed = program.try_get_matches_from_mut(TYPED.get().into_iter().flatten()).ok();
@@ -604,17 +604,17 @@ pub(crate) struct RecordingArguments {
 }
 
 impl RecordingArguments {
-    /// Of which nothing but the input is said.
+    /// The arguments of an input with no other option.
     pub(crate) fn new(input: InputArguments) -> Self {
         Self { input, rate: None, from: None, to: None }
     }
 
-    /// `file`, read in the same way.
+    /// These options for another `file`.
     pub(crate) fn of_file(&self, file: &Path) -> Self {
         Self { input: InputArguments { file: file.to_owned(), ..self.input.clone() }, ..self.clone() }
     }
 
-    /// The options that say how it is read, as they are typed.
+    /// The options with which the recording is read, as words of a command line.
     pub(crate) fn options(&self, is_quick: bool) -> Vec<String> {
         let Self { input: InputArguments { columns, units, topic, range, sensor, .. }, rate, from, to } = self;
         let range = match range {
@@ -688,22 +688,22 @@ pub(crate) struct InputArguments {
     /// Example: --sensor my-part.toml
     #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "NAME|FILE")]
     pub(crate) sensor: Option<String>,
-    /// What is in memory, in the place of the file.
+    /// A recording in memory instead of the file.
     #[arg(skip)]
     pub(crate) memory: Option<RecordingInMemory>,
 }
 
-/// A recording that is in no file.
+/// A recording in memory.
 #[derive(Debug, Clone)]
 pub(crate) enum RecordingInMemory {
-    /// The bytes of one.
+    /// The bytes of a file.
     Bytes(Arc<[u8]>),
     /// Arrays.
     Arrays(Arc<MemoryTable>),
 }
 
 impl InputArguments {
-    /// A file of which nothing is said.
+    /// The arguments of a file with no other option.
     pub(crate) fn new(file: &Path) -> Self {
         Self {
             file: file.to_owned(),
@@ -717,7 +717,7 @@ impl InputArguments {
         }
     }
 
-    /// Opens the recording; `monitor` as in [`RecordedInput::open_monitored`].
+    /// Opens the recording; `monitor` is passed to [`RecordedInput::open_monitored`].
     ///
     /// # Errors
     /// It cannot be read, or has no known format.
@@ -893,7 +893,7 @@ pub(crate) struct OutputArguments {
 }
 
 impl OutputArguments {
-    /// True if an output is standard output, which has nothing beside it then.
+    /// True if an output is standard output, to which nothing else may be written then.
     pub(crate) fn prints_to_standard_output(&self) -> bool {
         self.outputs.iter().any(|output| is_standard_stream(&output.file))
     }
@@ -915,7 +915,7 @@ pub(crate) struct JsonArgument {
 }
 
 impl JsonArgument {
-    /// The file, if one is named.
+    /// The file, if one is given.
     pub(crate) fn file(&self) -> Option<&Path> {
         self.output.as_ref().map(|output| output.file.as_path())
     }
@@ -926,7 +926,7 @@ mod tests {
     use super::{Cli, with_subcommand};
     use clap::{CommandFactory, Parser};
 
-    /// The words of a line of a shell, in which quotation marks may hold blanks.
+    /// Splits a command line as a shell does; quotation marks may contain blanks.
     fn words(line: &str) -> Vec<String> {
         let parts = line.split('"').enumerate();
         let words = |(at, part): (usize, &str)| -> Vec<String> {
@@ -952,7 +952,7 @@ mod tests {
             for example in &examples {
                 assert!(is_taken(example), "{example:?}");
             }
-            // The options of an example go with one of the command.
+            // The example of an option must be valid with at least one example of the command.
             let texts = command.get_arguments().filter_map(|argument| argument.get_long_help());
             for line in texts.flat_map(|text| text.to_string().lines().map(str::to_owned).collect::<Vec<_>>()) {
                 let Some(options) = line.strip_prefix("Example: ").map(words) else { continue };

@@ -1,4 +1,4 @@
-//! The command: runs a subcommand, prints its error, gives the exit code.
+//! The command: runs a subcommand, prints its error, returns the exit code.
 
 use crate::cli::{self, Cli, Command, MonitorArguments, ReplayArguments};
 use crate::inspect::{self, Question};
@@ -15,18 +15,18 @@ use std::ffi::OsString;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-/// The page that `demo` writes if no output is named.
+/// The page that `demo` writes if no output is given.
 const DEFAULT_PAGE: &str = "report.html";
 
 /// Exit codes.
 const SUCCESS: u8 = 0;
 const FAILURE: u8 = 1;
 const WRONG_USAGE: u8 = 2;
-/// Exit code of a result of a recording that was not read to its end.
+/// Exit code if the result is of a recording that was not read to its end.
 const INCOMPLETE: u8 = 3;
 
 /// Runs the command of `arguments`, the first of which is the name of the program. `prepare` is called before any other thread runs, with
-/// whether a simulation follows.
+/// true if a simulation follows.
 ///
 /// Exit code 0 for success, 1 for an error, 2 for wrong usage, 3 for a result of a recording that was not read to its end.
 #[must_use]
@@ -38,7 +38,7 @@ pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
         Ok(cli) => cli,
         Err(mut error) => {
             tip::suggest(&mut error);
-            // Where standard error is closed too, the exit code alone shows the error.
+            // If standard error is closed too, only the exit code shows the error.
             let _ = error.print();
             return u8::try_from(error.exit_code()).unwrap_or(FAILURE);
         }
@@ -46,14 +46,14 @@ pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
     prepare(matches!(cli.command, Command::Demo { .. }));
     match interrupt::watch().and_then(|()| run_subcommand(cli)) {
         Ok(()) => SUCCESS,
-        // The reader of standard output has closed it, as `head` does.
+        // The reader of standard output may close it, as `head` does.
         Err(error) if is_broken_pipe(&error) => SUCCESS,
         Err(error) if error.is::<Incomplete>() => {
             let _ = writeln!(io::stderr(), "warning: {}", Printable(&error.to_string()));
             INCOMPLETE
         }
         Err(error) => {
-            // Where standard error is closed too, the exit code alone shows the error.
+            // If standard error is closed too, only the exit code shows the error.
             let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
             if let Some(tip) = tip::tip(&error) {
                 let _ = writeln!(io::stderr(), "  tip: {}", Printable(&tip));
@@ -89,7 +89,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
         Command::Bench(arguments) => record::bench_device(&arguments),
         Command::Record { out, port, baud, seconds, output } => {
             OutputFiles::new([], output.force).check(&out)?;
-            // The log is read again: nothing else is written to it.
+            // The log is read again for the report: no other output may be written to it.
             let files = OutputFiles::new([out.as_path()], output.force);
             output::check(&output.outputs, &files)?;
             let report = record::record_device(&out, &port, baud, seconds)?;
@@ -101,7 +101,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Completions { shell } => {
-            // Into memory first: the generator panics where its output is closed.
+            // The script is made in memory first: the generator panics if its output is closed.
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), PROGRAM, &mut script);
             output::print(|out| out.write_all(&script))
@@ -110,10 +110,10 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
     }
 }
 
-/// Shows a device live, or in lines where there is no terminal.
+/// Shows a device live, or as lines if there is no terminal.
 fn monitor_device(arguments: &MonitorArguments) -> Result<()> {
     let MonitorArguments { port, baud, send, seconds } = arguments;
-    // No end is later than that of the clock.
+    // The end cannot be later than the clock's last time.
     let end = |seconds: f64| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?);
     let deadline = seconds.and_then(end);
     let show = || -> Result<()> {

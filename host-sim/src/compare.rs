@@ -1,4 +1,5 @@
-//! `compare`: recordings with each other, and with one of motors that run; a report with another, or with the data sheet.
+//! `compare`: recordings with each other or with one recorded while motors run, and a report with another or with the
+//! data sheet.
 
 use crate::analyze::SeveralReadings;
 use crate::cli::CompareArguments;
@@ -12,7 +13,7 @@ use recordings::Printable;
 use reports::comparison;
 use std::path::{Path, PathBuf};
 
-/// Compares the recordings or the reports of the arguments, and prints what differs.
+/// Compares the recordings or the reports of the arguments, and prints the differences.
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     let CompareArguments { recording, more, running, data_sheet, result } = arguments;
     let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
@@ -31,7 +32,8 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     Incomplete::check(reading.are_complete())
 }
 
-/// Compares the last report with the first, or with the data sheet, and prints the table; a recording is analysed.
+/// Compares the last report with the first, or with the data sheet, and prints the table. A recording is analysed
+/// first.
 fn compare_reports(files: &[&Path], arguments: &CompareArguments, outputs: &OutputFiles) -> Result<()> {
     let CompareArguments { recording, running, result, .. } = arguments;
     if running.is_some() {

@@ -44,7 +44,7 @@ fn convert(arguments: &RecordingArguments, out: &Path, format: RecordingFormat, 
 
 fn write(rows: &SensorRows, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<WrittenRows> {
     let mut unread = None;
-    // An error of the reader names the file that is read.
+    // An error of the reader already names the input.
     let mut without_name = |error: WriteError| match error {
         WriteError::Write(error) => Error::from(error),
         WriteError::Read(error) => {

@@ -1,4 +1,4 @@
-//! `export`: the noise of a report or a recording, or of those of the parts of one sensor, in the file format of another program.
+//! `export`: the noise of a report or a recording, or of several that are parts of one sensor, in the file format of another program.
 
 use crate::cli::ExportArguments;
 use crate::input_file::Reports;

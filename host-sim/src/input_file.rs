@@ -1,4 +1,4 @@
-//! Reports that `analyze` wrote as JSON, or makes of recordings.
+//! Reports, read from the JSON of `analyze` or made of recordings.
 
 use crate::analyze::watched_report;
 use crate::cli::RecordingArguments;
@@ -11,10 +11,10 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
-/// Bytes that tell a report.
+/// Bytes at the beginning of a file by which a report is recognised.
 const HEAD: u64 = 64;
 
-/// True if a file begins as the JSON of a report; a pipe is not looked at.
+/// True if a file begins as the JSON of a report; a pipe is not read.
 pub(crate) fn is_report(file: &Path) -> bool {
     let mut head = Vec::new();
     let is_file = file.is_file();
@@ -25,24 +25,24 @@ pub(crate) fn is_report(file: &Path) -> bool {
 /// Reads the JSON that `analyze` wrote.
 ///
 /// # Errors
-/// Names the file.
+/// The error names the file.
 fn read_report(file: &Path) -> Result<SavedReport> {
     let text = fs::read_to_string(file).map_err(|error| InputError::file(file, Reason::Io(error)))?;
     let checked = SavedReport::from_json(&text).and_then(|report| report.check().map(|()| report));
     checked.map_err(|error| Error::from(error).context(file.display().to_string()))
 }
 
-/// Reports that are read or made one after the other.
+/// Reads or makes reports one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct Reports {
     has_incomplete: bool,
 }
 
 impl Reports {
-    /// The report in a file, or that of the recording in it.
+    /// Reads the report in a file, or analyses the recording in it.
     ///
     /// # Errors
-    /// Names the file.
+    /// The error names the file.
     pub(crate) fn read(&mut self, recording: &RecordingArguments) -> Result<SavedReport> {
         if is_report(&recording.input.file) {
             return read_report(&recording.input.file);

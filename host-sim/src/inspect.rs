@@ -1,4 +1,4 @@
-//! `inspect`: what is in a file, without an analysis; and the command that would analyse a file which does not say all that is needed.
+//! `inspect`: the contents of a file, without an analysis, and the command that would analyse it, with guesses for missing information.
 
 use crate::cli::{self, InputArguments, InspectArguments, RecordingArguments};
 use crate::output::{self, Incomplete, note};
@@ -10,22 +10,22 @@ use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Propo
 use recordings::sample_stream::StreamError;
 use recordings::time_base::{TimeBaseError, TimeRange};
 use recordings::{ColumnSelection, InputError, Printable, ReadMonitor, Reason};
-use reports::rounding::plain;
+use reports::rounding::compact;
 use reports::summary::time_options;
 use std::fmt::{self, Display, Write as _};
 use std::io::Write;
 use std::path::Path;
 
-/// Columns of a table, and topics that are not read, that are shown at most.
+/// Most columns of a table, and most topics without data, that are shown.
 const MOST_COLUMNS: usize = 64;
 const MOST_TOPICS: usize = 32;
-/// Columns of a table beyond which those that never change are not shown one by one.
+/// Number of columns of a table above which constant columns are not shown one by one.
 const WIDE: usize = 16;
 
 /// Reads a recording as `analyze` does.
 type ReadMeasurement = fn(&RecordingArguments) -> Result<Measurement>;
 
-/// Prints what is in the files of the arguments; `read` reads a log of the bus.
+/// Prints the contents of the files of the arguments; `read` reads a log of the bus.
 pub(crate) fn run(arguments: &InspectArguments, read: ReadMeasurement) -> Result<()> {
     let InspectArguments { files, topic } = arguments;
     let mut is_complete = true;
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &InspectArguments, read: ReadMeasurement) -> Result
     Incomplete::check(is_complete)
 }
 
-/// A log of the bus has no columns to choose: it is read as `analyze` reads it.
+/// Describes a log of the bus. It has no columns to choose, so it is read as `analyze` reads it.
 fn describe_bus_log(file: &Path, read: ReadMeasurement) -> Result<String> {
     let input = InputArguments::new(file);
     let measurement = read(&RecordingArguments::new(input))?;
@@ -67,10 +67,10 @@ fn describe_bus_log(file: &Path, read: ReadMeasurement) -> Result<String> {
     ))
 }
 
-/// The arguments for each sensor that the file of `recording` has, with what the file does not say guessed where `--accept-guess` takes it.
+/// The arguments for each sensor of the file of `recording`. With `--accept-guess`, missing information is guessed.
 ///
 /// # Errors
-/// The file is damaged, or has one sensor, or something is missing that is not guessed.
+/// The file is damaged, or has one sensor, or lacks information that is not guessed.
 pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<RecordingArguments>> {
     let opened = recording.input.open(&ReadMonitor::default())?;
     let contents = Contents::read(&opened, recording.clone())?;
@@ -89,7 +89,7 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
     Ok(proposals.into_iter().map(|proposal| contents.arguments(proposal)).collect())
 }
 
-/// The longest part at rest of the file of `recording`, as `inspect` shows it; `None` where that shows none, or more than one table.
+/// The longest part at rest of the file of `recording`, as `inspect` shows it; `None` if it shows none, or more than one table.
 pub(crate) fn part_at_rest(recording: &RecordingArguments) -> Option<TimeRange> {
     let file = &recording.input.file;
     let is_read_again = !is_standard_stream(file);
@@ -116,7 +116,7 @@ impl Contents {
         let InputArguments { columns, units, topic, .. } = &given.input;
         let mut tables = input.inspect(topic.as_deref(), &ColumnSelection::parse(columns, units)?)?;
         for proposal in tables.iter_mut().flat_map(|table| &mut table.proposals) {
-            // The user's statement stands.
+            // A rate that the user states needs no proposal.
             proposal.lacks_rate &= given.rate.is_none();
             proposal.topic = topic.clone().or(proposal.topic.take());
             proposal.units.splice(0..0, units.iter().cloned());
@@ -136,7 +136,7 @@ impl Contents {
         self.tables.iter().flat_map(|table| &table.proposals)
     }
 
-    /// The arguments with what is proposed.
+    /// The arguments with the proposal filled in.
     fn arguments(&self, proposal: &Proposal) -> RecordingArguments {
         let mut arguments = self.given.clone();
         arguments.input.topic.clone_from(&proposal.topic);
@@ -150,10 +150,10 @@ impl Contents {
         arguments
     }
 
-    /// The command that analyses a sensor, with what was typed beside it.
+    /// The command that analyses a sensor, with the options that the user gave.
     fn command(&self, proposal: &Proposal) -> String {
         let mut arguments = self.arguments(proposal);
-        // An only sensor that the format knows is found without its name.
+        // If the file has one sensor that the format identifies, the command needs no topic.
         let is_only = self.proposals().count() == 1 && self.several.is_empty() && proposal.is_found;
         arguments.input.topic = arguments.input.topic.filter(|_| !is_only || self.given.input.topic.is_some());
         let file = self.given.input.file.display().to_string();
@@ -197,7 +197,7 @@ impl Display for Contents {
                 writeln!(f, "    in doubt: {doubt}")?;
             }
         }
-        // As `--each-sensor` takes them.
+        // `--each-sensor` accepts these proposals.
         let is_taken = |proposal: &Proposal| proposal.is_complete() || proposal.is_safe();
         if self.proposals().count() > 1 && self.proposals().all(is_taken) {
             let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --accept-guess" };
@@ -236,14 +236,14 @@ fn write_table(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resul
     write_steady(table, f)?;
     let mut lines = vec![["column", "unit", "first values", "mean", "noise", "step", "taken for"].map(str::to_owned)];
     let mut reason = "";
-    // In a wide table, such as one of messages with covariances, columns that never change are named alone.
+    // In a wide table, such as one of messages with covariances, constant columns are only named.
     let is_constant = |column: &&InspectedColumn| {
         columns.len() > WIDE && column.noise == 0.0 && column.guess.is_none() && !column.mean.is_nan()
     };
     let constant: Vec<&str> = columns.iter().filter(is_constant).map(|column| column.name.as_str()).collect();
     let shown = || columns.iter().filter(|column| !is_constant(column));
     for column in shown().take(MOST_COLUMNS) {
-        // Columns beside each other often have one reason.
+        // Neighbouring columns often have the same reason, which is shown once.
         let own = column.guess.as_ref().map_or("", |guess| guess.reason.as_str());
         lines.push(line(column, if own == reason { "" } else { own }));
         reason = own;
@@ -281,7 +281,7 @@ fn write_steady(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resu
 
 fn line(column: &InspectedColumn, reason: &str) -> [String; 7] {
     let InspectedColumn { name, unit, first, mean, noise, step, guess } = column;
-    let first: Vec<String> = first.iter().map(|value| short(*value)).collect();
+    let first: Vec<String> = first.iter().map(|value| compact(*value, 6)).collect();
     let guess = guess.as_ref().map_or_else(String::new, |ColumnGuess { channel, unit, .. }| {
         let unit = unit.map_or_else(String::new, |unit| format!(" in {unit}"));
         let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
@@ -292,42 +292,27 @@ fn line(column: &InspectedColumn, reason: &str) -> [String; 7] {
         Printable(name).to_string(),
         unit.unwrap_or("").to_owned(),
         if is_number { first.join(" ") } else { "no numbers".to_owned() },
-        if is_number { short(*mean) } else { String::new() },
-        if is_number { rounded(*noise, 3) } else { String::new() },
-        step.map_or_else(String::new, short),
+        if is_number { compact(*mean, 6) } else { String::new() },
+        if is_number { compact(*noise, 3) } else { String::new() },
+        step.map_or_else(String::new, |step| compact(step, 6)),
         guess,
     ]
 }
 
-/// A number in six digits; whole ones have all of theirs.
-fn short(value: f64) -> String {
-    if value.fract() == 0.0 && value.abs() < 1e20 { format!("{value:.0}") } else { rounded(value, 6) }
-}
-
-/// A number in so many significant digits.
-fn rounded(value: f64, digits: i32) -> String {
-    let magnitude = value.abs();
-    if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
-        plain(value, digits)
-    } else {
-        format!("{value:.*e}", digits as usize - 1)
-    }
-}
-
-/// A text as one word of a shell, without what a terminal obeys.
+/// A text as one word of a shell, without terminal control characters.
 fn quoted(text: &str) -> String {
     let text = Printable(text).to_string();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./,=:+@%".contains(c);
     if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
-/// An error that what is in the file may answer, with the columns and the command.
+/// An error that more options can resolve, with the columns of the file and the command.
 #[derive(Debug)]
 pub(crate) struct Question {
     error: anyhow::Error,
     /// The table and the command, in lines.
     pub(crate) text: String,
-    /// Effect of the option `--accept-guess`, in a line; empty if there is none.
+    /// Effect of the option `--accept-guess`, in one line; empty if it has none.
     pub(crate) hint: &'static str,
 }
 
@@ -339,8 +324,8 @@ impl Display for Question {
 
 impl std::error::Error for Question {}
 
-/// Result of `read` for a recording. If the file does not say all that is needed, the error shows its columns and the command with the
-/// best guess; with `--accept-guess` the guess is taken, and told, if it is safe.
+/// The result of `read` for a recording. If the file lacks information, the error shows its columns and the command with the best guess.
+/// With `--accept-guess` a safe guess is used, and printed.
 pub(crate) fn read_or_ask<R>(
     recording: &RecordingArguments,
     read: impl Fn(&RecordingArguments) -> Result<R>,

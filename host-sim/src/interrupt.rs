@@ -1,7 +1,7 @@
-//! Signals that end the program: an interrupt of the terminal, a hang-up, a request to end.
+//! Signals that end the program: interrupt, hang-up, termination.
 //!
-//! The first one may be taken up by what runs, which then ends in good order; any other removes the files that are not complete and ends
-//! the program.
+//! The running command may handle the first signal and then ends in good order. Any other signal removes incomplete files and ends the
+//! program.
 
 use anyhow::{Context, Result};
 #[cfg(unix)]
@@ -17,13 +17,13 @@ use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use tempfile::{Builder, TempDir};
 
-/// Exit status of a program that a signal has ended, as shells have it, less the number of the signal.
+/// Exit status of a program that a signal has ended, less the number of the signal, as in shells.
 const ENDED_BY_SIGNAL: i32 = 128;
 
-/// A command makes a file or two in a folder.
+/// Attempts to remove a folder, in which a command may still create a file or two.
 const ATTEMPTS_TO_REMOVE: usize = 8;
 
-/// Takes a signal up, or does not.
+/// Returns true if it handles the signal.
 type Action = Box<dyn FnMut() -> bool + Send>;
 
 static ACTION: LazyLock<Mutex<Option<Action>>> = LazyLock::new(Mutex::default);
@@ -33,7 +33,7 @@ fn lock<T>(shared: &'static Mutex<T>) -> MutexGuard<'static, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Begins to wait for signals. A hang-up that the caller ignores, as `nohup` makes it, is ignored here too.
+/// Starts to wait for signals. A hang-up that the caller ignores, as with `nohup`, is ignored.
 ///
 /// # Errors
 /// The system refuses.
@@ -45,7 +45,7 @@ pub(crate) fn watch() -> Result<()> {
     Ok(())
 }
 
-/// Begins to wait for an interrupt of the terminal, the only signal that the system has.
+/// Starts to wait for an interrupt of the terminal, the only signal of this system.
 ///
 /// # Errors
 /// The system refuses.
@@ -55,12 +55,12 @@ pub(crate) fn watch() -> Result<()> {
     ctrlc::set_handler(|| take(SIGINT)).context("signals")
 }
 
-/// Has the action take a signal up, or ends the program.
+/// Lets the action handle a signal, or ends the program.
 fn take(signal: i32) {
     let is_taken_up = lock(&ACTION).as_mut().is_some_and(|action| action());
     if !is_taken_up {
-        // Locked until the program has ended: no folder is made any more. In one that is being removed a file may still be made, which the
-        // next attempt removes.
+        // The lock is held until the program ends, so that no more folders are created. A file may still be created in a folder that is
+        // being removed; the next attempt removes it.
         let incomplete = lock(&INCOMPLETE);
         for folder in incomplete.iter() {
             let _is_removed = (0..ATTEMPTS_TO_REMOVE).any(|_| fs::remove_dir_all(folder).is_ok());
@@ -69,7 +69,7 @@ fn take(signal: i32) {
     }
 }
 
-/// True if the program was started with `signal` ignored, where the system says it.
+/// True if the program was started with `signal` ignored; false if the system does not say.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -77,14 +77,14 @@ fn is_ignored(signal: i32) -> bool {
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Has `action` decide about the signals that come from now on: it returns whether it takes one up.
+/// Sets the action for later signals; it returns true if it handles one.
 pub(crate) fn on_signal(action: impl FnMut() -> bool + Send + 'static) {
     *lock(&ACTION) = Some(Box::new(action));
 }
 
-/// A folder of files that are not complete, removed when this is dropped, or when a signal ends the program.
+/// A folder of incomplete files. It is removed when this is dropped, or when a signal ends the program.
 pub(crate) struct IncompleteFiles {
-    // Removed before it is forgotten: a signal between the two finds it.
+    // This field is dropped first: a signal before the next drop still finds the name.
     folder: TempDir,
     _name: RemovedAtSignal,
 }
@@ -93,7 +93,7 @@ pub(crate) struct IncompleteFiles {
 struct RemovedAtSignal(PathBuf);
 
 impl IncompleteFiles {
-    /// Makes the folder in `place`; a signal meanwhile waits until the folder is known.
+    /// Creates the folder in `place`; a signal meanwhile waits until the folder is registered.
     ///
     /// # Errors
     /// The folder cannot be made.

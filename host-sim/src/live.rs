@@ -15,25 +15,25 @@ use std::time::{Duration, Instant};
 /// Time between two drawings.
 const FRAME: Duration = Duration::from_millis(100);
 
-/// Whether the program has a terminal to draw on and to read keys from.
+/// True if the program has a terminal to draw on and to read keys from.
 pub(crate) fn has_terminal() -> bool {
     std::io::stdout().is_terminal() && std::io::stdin().is_terminal()
 }
 
-/// Whether the user wants colour: `NO_COLOR` is not set, or empty.
+/// True unless the user does not want colour: `NO_COLOR` is not set, or empty.
 fn wants_colour() -> bool {
     std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
-/// Shows the device on `port`, at the other end of `cable`, on the whole terminal until the user ends it, the device hangs up, `until`, or an
-/// interrupt. The terminal is restored then, and also if the program panics.
+/// Shows the device on `port`, at the other end of `cable`, on the whole terminal. It ends when the user ends it, when the device hangs up,
+/// at `until`, or at an interrupt. The terminal is restored then, and also if the program panics.
 ///
 /// # Errors
 /// The port or the terminal fails.
 pub(crate) fn show<P: Read + Write>(cable: &mut SerialLink<P>, port: &str, until: Option<Instant>) -> Result<()> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    // In the terminal's raw mode Ctrl-C is a key; this is for a signal from elsewhere.
+    // In the terminal's raw mode Ctrl-C is a key; this handles a signal from elsewhere.
     interrupt::on_signal(move || {
         flag.store(true, Relaxed);
         true
@@ -57,7 +57,7 @@ fn draw_until_end<P: Read + Write>(
     let (mut messages, mut last_received) = (LatestMessages::new(port.to_owned()), Instant::now());
     loop {
         let view = messages.view(last_received.elapsed(), &cable.counters());
-        // A changed size of the terminal is taken up here.
+        // The drawing adapts to a changed size of the terminal.
         terminal.draw(|frame| view.draw(frame, group, in_colour))?;
         if interrupted.load(Relaxed) || until.is_some_and(|until| Instant::now() >= until) {
             return Ok(());

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 pub use observatory::message_text::LONG_SILENCE;
 
-/// Writes every message to `out` until the device disconnects or `deadline`, then the [`summary`]. `silence` is the time after which it is
-/// said that nothing comes.
+/// Writes every message to `out` until the device disconnects or `deadline`, then the [`summary`]. After `silence` without a message it
+/// writes that nothing comes.
 ///
 /// # Errors
 /// The port fails, or `out` cannot be written.

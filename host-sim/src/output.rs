@@ -22,15 +22,15 @@ use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Columns where standard output is no terminal, or does not say how wide it is.
+/// Columns if standard output is no terminal, or its width is unknown.
 const USUAL_COLUMNS: usize = 80;
 
-/// Checks that the files which the arguments name can be written and are no inputs, before any work is done.
+/// Checks before any work that the files of the arguments can be written and are not inputs.
 ///
 /// # Errors
-/// Names the file.
+/// The error names the file.
 pub(crate) fn check<'a>(outputs: impl IntoIterator<Item = &'a OutputFile>, files: &OutputFiles) -> Result<()> {
-    // A figure that a report with gyros has stands for all of them.
+    // One figure that every report with gyros has stands for all figures.
     let written = |OutputFile { format, file }: &OutputFile| match format {
         OutputFormat::Figures => figure_file(file, "overview-gyros"),
         _ => file.clone(),
@@ -38,17 +38,17 @@ pub(crate) fn check<'a>(outputs: impl IntoIterator<Item = &'a OutputFile>, files
     files.check_all(&outputs.into_iter().map(written).collect::<Vec<_>>())
 }
 
-/// `run1.svg` as the file of one of its figures, `run1-gyro_x-allan.svg`.
+/// The file of one figure: `run1.svg` gives `run1-gyro_x-allan.svg`.
 fn figure_file(file: &Path, figure: &str) -> PathBuf {
     file.with_file_name(format!("{}-{figure}.svg", file.file_stem().unwrap_or_default().to_string_lossy()))
 }
 
-/// A report, and what was read for it.
+/// A report, and the record of its reading.
 #[derive(Debug)]
 pub struct Analysed {
     /// The report.
     pub report: Report,
-    /// `None` where it is of no recording.
+    /// The record; `None` if the report is not of a recording.
     pub reading: Option<ReadingRecord>,
 }
 
@@ -66,12 +66,12 @@ impl Analysed {
     }
 }
 
-/// The result is written, and the recording was not read to its end.
+/// The error that the result was written although the recording was not read to its end.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct Incomplete(pub(crate) String);
 
-/// Wrong usage that the parser of the arguments does not see.
+/// Wrong usage that the argument parser does not detect.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct Misuse(pub(crate) String);
@@ -83,8 +83,8 @@ impl Incomplete {
     }
 }
 
-/// Prints a report and writes the files that the arguments name; `source` is the name of the recording. A file that cannot be
-/// written does not keep the others, or the report, from being written.
+/// Prints a report and writes the files of the arguments; `source` is the name of the recording. If a file cannot be written, the report
+/// and the other files are still written.
 ///
 /// # Errors
 /// A file cannot be written; or the recording was [not read to its end](Incomplete).
@@ -122,7 +122,7 @@ pub(crate) fn write_report(
     Incomplete::check(analysed.is_complete())
 }
 
-/// How a recording is called in a report: by the name of its file, without the folder.
+/// The name of a recording in a report: its file name without the folder.
 pub(crate) fn source_name(file: &Path) -> String {
     if is_standard_stream(file) {
         return "standard input".to_owned();
@@ -142,7 +142,7 @@ fn show(analysed: &Analysed, source: Option<&str>, is_full: bool) -> Result<()> 
 
 /// Prints the screen of a report on the recording `source`.
 pub(crate) fn show_screen(report: &Report, source: Option<&str>) -> Result<()> {
-    // Without colour where standard output is no terminal, or NO_COLOR is set.
+    // The stream removes colour if standard output is no terminal, or NO_COLOR is set.
     let mut out = anstream::AutoStream::auto(io::stdout().lock());
     Screen { report, source, columns: columns() }.write(&mut out)?;
     Ok(out.flush()?)
@@ -161,7 +161,7 @@ fn write_text(text: &str, file: &Path, files: &OutputFiles) -> Result<()> {
     files.write(file, text.as_bytes())
 }
 
-/// Writes the noise of a report in a format, and notes what the format wants and the report does not say.
+/// Writes the noise of a report in a format, and prints which values of the format the report lacks.
 pub(crate) fn write_noise(
     report: &SavedReport,
     format: ExportFormat,
@@ -198,15 +198,15 @@ pub(crate) fn print(write: impl FnOnce(&mut BufWriter<StdoutLock>) -> io::Result
     Ok(out.flush()?)
 }
 
-/// Whether this process is the command, and not a program that calls its functions.
+/// True if this process is the command, false if another program calls its functions.
 static IS_COMMAND: AtomicBool = AtomicBool::new(false);
 
-/// Lets this process show progress.
+/// Enables progress bars in this process.
 pub(crate) fn show_progress() {
     IS_COMMAND.store(true, Relaxed);
 }
 
-/// A progress bar on standard error, shown by the command on a terminal only.
+/// A progress bar on standard error, visible only for the command on a terminal.
 pub(crate) fn progress_bar(length: u64, template: &str) -> ProgressBar {
     if !IS_COMMAND.load(Relaxed) {
         return ProgressBar::hidden();
@@ -220,16 +220,17 @@ pub(crate) fn progress_bar(length: u64, template: &str) -> ProgressBar {
 
 /// Prints a note on standard error.
 pub(crate) fn note(text: fmt::Arguments<'_>) {
-    // The result does not depend on the note: a closed standard error is no reason to stop.
+    // The result does not depend on the note, so a closed standard error is not an error.
     let _ = writeln!(io::stderr(), "note: {}", Printable(&brief(&text.to_string())));
 }
 
-/// Characters of a message, and those of its beginning and its end that are kept of a longer one, which quotes its input.
+/// Most characters of a message, and the characters kept at the beginning and the end of a longer one, which quotes its
+/// input.
 const MESSAGE: usize = 2000;
 const BEGINNING: usize = 1200;
 const END: usize = 600;
 
-/// A message without the middle of what is too long to be read.
+/// A message, without its middle if it is too long to be read.
 pub(crate) fn brief(text: &str) -> Cow<'_, str> {
     let length = text.chars().count();
     if length <= MESSAGE {

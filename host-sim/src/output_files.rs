@@ -1,5 +1,5 @@
-//! The files that a command writes: none of them is a file that it reads, whatever its name; each is complete or as it was; and one that
-//! exists is overwritten where the user says so.
+//! The files that a command writes. None of them is one of its inputs, under any name. Each is either complete or unchanged. An existing
+//! file is overwritten only if the user allows it.
 
 use crate::interrupt::IncompleteFiles;
 use anyhow::{Context, Result, bail};
@@ -15,7 +15,7 @@ pub(crate) fn is_standard_stream(file: &Path) -> bool {
     file.as_os_str() == "-"
 }
 
-/// Place where a file is or will be, without links.
+/// Path of an existing or future file, without links.
 fn place(file: &Path) -> PathBuf {
     let in_folder = || Some(fs::canonicalize(folder_of(file)).ok()?.join(file.file_name()?));
     fs::canonicalize(file).ok().or_else(in_folder).unwrap_or_else(|| file.to_owned())
@@ -25,16 +25,16 @@ fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Writes the files of a command that reads some others.
+/// Writes the output files of a command with the given inputs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct OutputFiles {
-    /// Places of the files that are read; `-` is standard input.
+    /// Paths of the input files; `-` is standard input.
     inputs: Vec<PathBuf>,
     overwrites: bool,
 }
 
 impl OutputFiles {
-    /// Outputs of a command that reads `inputs`, where `-` is standard input; files that exist are refused unless it `overwrites` them.
+    /// Outputs of a command that reads `inputs`, where `-` is standard input. Unless it `overwrites`, existing files are refused.
     pub(crate) fn new<'a>(inputs: impl IntoIterator<Item = &'a Path>, overwrites: bool) -> Self {
         let place = |file: &Path| if is_standard_stream(file) { file.to_owned() } else { place(file) };
         let files = |input: &Path| [vec![place(input)], files_of_bag(input).unwrap_or_default()].concat();
@@ -43,7 +43,7 @@ impl OutputFiles {
 
     /// Refuses a file that the command reads, under any of its names.
     fn check_identity(&self, file: &Path) -> Result<()> {
-        // No more than two files are held open. A pipe is no output that is replaced, and must not be opened twice.
+        // At most two files are open at once. A pipe is not replaced, and must not be opened twice.
         let is_file = |file: &Path| fs::metadata(file).is_ok_and(|metadata| metadata.is_file());
         let handle = |file: &Path| if is_file(file) { Handle::from_path(file).ok() } else { None };
         let (place, output) = (place(file), handle(file));
@@ -66,10 +66,10 @@ impl OutputFiles {
         Ok(())
     }
 
-    /// Checks before any work that `files` can be written, and that they are different ones and no inputs; `-` is standard output.
+    /// Checks before any work that `files` can be written, are different, and are not inputs; `-` is standard output.
     ///
     /// # Errors
-    /// Names the file.
+    /// The error names the file.
     pub(crate) fn check_all(&self, files: &[PathBuf]) -> Result<()> {
         let mut places: Vec<PathBuf> = Vec::new();
         for file in files {
@@ -85,15 +85,16 @@ impl OutputFiles {
         Ok(())
     }
 
-    /// Checks before any work that `file` can be written, is no input, and does not exist unless it may be overwritten.
+    /// Checks before any work that `file` can be written, is not an input, and does not exist unless it may be
+    /// overwritten.
     ///
     /// # Errors
-    /// Names the file.
+    /// The error names the file.
     pub(crate) fn check(&self, file: &Path) -> Result<()> {
         let check = || -> Result<()> {
             self.check_name(file)?;
             match fs::metadata(file) {
-                // A pipe or a device is not opened twice.
+                // A pipe or a device must not be opened twice.
                 Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => return Ok(()),
                 Ok(_) => drop(OpenOptions::new().write(true).open(file)?),
                 Err(_) => {}
@@ -107,15 +108,16 @@ impl OutputFiles {
     /// Writes `content` to `file`.
     ///
     /// # Errors
-    /// As [`write_with`](Self::write_with).
+    /// Those of [`write_with`](Self::write_with).
     pub(crate) fn write(&self, file: &Path, content: &[u8]) -> Result<()> {
         self.write_with(file, |file| Ok(fs::write(file, content)?))
     }
 
-    /// Writes `file` with `write`, which is given a file of the same name in a folder beside it; that takes its place when it is complete.
+    /// Writes a file of the same name in a folder beside `file` with `write`. When it is complete, it replaces `file`.
     ///
     /// # Errors
-    /// The file is an input, must not be overwritten, or cannot be written; it is then as it was. The error names it.
+    /// The file is an input, must not be overwritten, or cannot be written. It is unchanged then, and the error names
+    /// it.
     pub(crate) fn write_with<R>(&self, file: &Path, write: impl FnOnce(&Path) -> Result<R>) -> Result<R> {
         let replace = || -> Result<R> {
             self.check_name(file)?;
@@ -132,7 +134,7 @@ impl OutputFiles {
         replace().with_context(|| file.display().to_string())
     }
 
-    /// Gives a complete file its name.
+    /// Moves a complete file to its name.
     fn persist(&self, complete: TempPath, target: &Path) -> io::Result<()> {
         let complete = if self.overwrites {
             complete
@@ -142,14 +144,14 @@ impl OutputFiles {
                 persisted => return persisted.map_err(Into::into),
             }
         };
-        // Not every file system can refuse to replace a file.
+        // Some file systems cannot refuse to replace a file.
         complete.persist(target).map_err(Into::into)
     }
 
     /// Writes `file` through a buffer.
     ///
     /// # Errors
-    /// As [`write_with`](Self::write_with).
+    /// Those of [`write_with`](Self::write_with).
     pub(crate) fn write_buffered(
         &self,
         file: &Path,
@@ -163,13 +165,13 @@ impl OutputFiles {
     }
 }
 
-/// The file that `file` leads to, which is replaced, and not a link to it.
+/// The file to be replaced: the target of `file` if it is a link.
 fn target(file: &Path) -> PathBuf {
     fs::canonicalize(file).unwrap_or_else(|_| file.to_owned())
 }
 
-/// An empty file in `folder` that will be `file`: with its name, by whose ending writers choose the compression, and its permissions if it
-/// exists.
+/// Creates an empty file in `folder` that will become `file`. It has the same name, since writers choose the compression by its ending, and
+/// the same permissions if `file` exists.
 fn incomplete_file(file: &Path, folder: &Path) -> Result<TempPath> {
     let incomplete = folder.join(file.file_name().unwrap_or_default());
     let mut options = OpenOptions::new();
@@ -177,7 +179,7 @@ fn incomplete_file(file: &Path, folder: &Path) -> Result<TempPath> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
-        // Those of a new file, less what the user's mask takes.
+        // A new file has the default permissions less the user's mask.
         options.mode(fs::metadata(file).map_or(0o666, |metadata| metadata.permissions().mode()));
     }
     options.open(&incomplete)?;

@@ -1,4 +1,4 @@
-//! `-o [FORMAT=]FILE`: what is written to a file, by its ending or by the name of a format before it.
+//! `-o [FORMAT=]FILE`: the format of an output file, by its ending or by the name before it.
 
 use crate::output_files::is_standard_stream;
 use crate::tip::similar_name;
@@ -7,7 +7,7 @@ use reports::export::ExportFormat;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// A form in which a report is written.
+/// The format of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OutputFormat {
     /// The whole report.
@@ -20,7 +20,7 @@ pub(crate) enum OutputFormat {
     Noise(ExportFormat),
 }
 
-/// Endings and the formats that they choose.
+/// Endings, with the formats that they select.
 const ENDINGS: [(&str, OutputFormat); 9] = [
     ("json", OutputFormat::Json),
     ("html", OutputFormat::Page),
@@ -40,7 +40,7 @@ pub(crate) struct OutputFile {
     pub(crate) file: PathBuf,
 }
 
-/// Formats that are named before the file.
+/// The formats that can be named before the file.
 fn named_formats() -> impl Iterator<Item = (String, OutputFormat)> {
     let of_noise = |format: &ExportFormat| Some((format.to_possible_value()?.get_name().to_owned(), *format));
     let noise = ExportFormat::value_variants().iter().filter_map(of_noise);
@@ -48,7 +48,7 @@ fn named_formats() -> impl Iterator<Item = (String, OutputFormat)> {
     of_report.chain(noise.map(|(name, format)| (name, OutputFormat::Noise(format))))
 }
 
-/// `report.html`, `kalibr=imu.yaml`, or `-` for JSON on standard output.
+/// Parses an output: `report.html`, `kalibr=imu.yaml`, or `-` for JSON on standard output.
 pub(crate) fn output_file(text: OsString) -> Result<OutputFile, String> {
     let file = PathBuf::from(&text);
     if is_standard_stream(&file) {
@@ -87,7 +87,7 @@ fn format_by_ending(file: &Path) -> Result<OutputFormat, String> {
     })
 }
 
-/// An output of `export`: the noise alone.
+/// Parses an output of `export`, which is the noise alone.
 pub(crate) fn noise_file(text: OsString) -> Result<OutputFile, String> {
     output_file(text).and_then(|output| match output.format {
         OutputFormat::Noise(_) => Ok(output),
@@ -97,7 +97,7 @@ pub(crate) fn noise_file(text: OsString) -> Result<OutputFile, String> {
     })
 }
 
-/// An output of `compare`: JSON.
+/// Parses an output of `compare`, which is JSON.
 pub(crate) fn json_file(text: OsString) -> Result<OutputFile, String> {
     output_file(text).and_then(|output| match output.format {
         OutputFormat::Json => Ok(output),

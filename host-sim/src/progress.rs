@@ -1,4 +1,4 @@
-//! How far an analysis is, on standard error where that is a terminal; and its interruption.
+//! Progress of an analysis on standard error if that is a terminal, and its interruption.
 
 use crate::interrupt;
 use crate::output::progress_bar;
@@ -12,14 +12,14 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Time between two looks at the reader.
+/// Time between two updates of the bar.
 const INTERVAL: Duration = Duration::from_millis(100);
 const READING: &str = "{msg} {wide_bar} {bytes}/{total_bytes} {eta}";
 const READING_PIPE: &str = "{msg} {spinner} {bytes} {elapsed}";
 const FITTING: &str = "fitting {wide_bar} {pos}/{len} channels {elapsed}";
 const ANALYSING: &str = "analysing {wide_bar} {pos}/{len} {msg} {elapsed}";
 
-/// The bar of one recording: first bytes that were read, then parts of the analysis that are done.
+/// The bar of one recording: first the bytes read, then the finished parts of the analysis.
 pub(crate) struct Progress {
     monitor: ReadMonitor,
     is_over: Arc<AtomicBool>,
@@ -27,8 +27,8 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Begins to show how far the reading of `file` is. An interrupt then ends the reading, and a second one, or one at any other
-    /// time, the program.
+    /// Starts the bar for the reading of `file`. An interrupt ends the reading. A second interrupt, or one at any other time, ends the
+    /// program.
     pub(crate) fn reading(file: &Path) -> Self {
         let monitor = ReadMonitor::default();
         let of_handler = monitor.clone();
@@ -66,17 +66,17 @@ impl Progress {
         Self { monitor, is_over, watcher: Some(watcher) }
     }
 
-    /// Monitor of the readers.
+    /// The monitor for the readers.
     pub(crate) fn monitor(&self) -> &ReadMonitor {
         &self.monitor
     }
 
-    /// Ends the bar of the reading; whether that was interrupted.
+    /// Ends the bar of the reading; returns true if the reading was interrupted.
     pub(crate) fn end_reading(&mut self) -> bool {
         self.is_over.store(true, Relaxed);
         if let Some(watcher) = self.watcher.take() {
             watcher.thread().unpark();
-            // The bar is no reason to fail.
+            // A failure of the bar is not an error.
             let _ended = watcher.join();
         }
         self.monitor.is_interrupted()
@@ -89,7 +89,7 @@ impl Drop for Progress {
     }
 }
 
-/// Purpose of the reading of a recording, beside its bar.
+/// Purpose of a pass over a recording, shown beside the bar.
 fn purpose(pass: ReadPass) -> &'static str {
     match pass {
         ReadPass::FirstRows => "reading",
@@ -98,7 +98,7 @@ fn purpose(pass: ReadPass) -> &'static str {
     }
 }
 
-/// The bar, with a thread that draws it where it is shown.
+/// The bar, with a thread that draws it if it is visible.
 fn ticking(bar: ProgressBar) -> ProgressBar {
     if !bar.is_hidden() {
         bar.enable_steady_tick(INTERVAL);
@@ -106,12 +106,12 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
     bar
 }
 
-/// The bar of the fits of so many channels, one after the other.
+/// The bar of the fits of `channels` channels, one after the other.
 pub(crate) fn fitting(channels: usize) -> ProgressBar {
     ticking(progress_bar(channels as u64, FITTING))
 }
 
-/// Runs `analyze` beside the bar of its stages.
+/// Runs `analyze` with a bar of its stages.
 pub(crate) fn analysing<R>(analyze: impl FnOnce(&dyn Fn(Stage)) -> R) -> R {
     let bar = ticking(progress_bar(Stage::COUNT as u64, ANALYSING));
     let result = analyze(&|stage| {

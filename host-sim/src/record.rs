@@ -1,4 +1,4 @@
-//! `record`, `bench` and `demo`: the report of a device, of which a recording is left, or of the virtual sensor.
+//! `record`, `bench` and `demo`: the report of a device, whose recording is kept, or of the virtual sensor.
 
 use crate::analyze::analyze_recording;
 use crate::bench::{self, BenchPlan, SerialConsole};
@@ -27,7 +27,7 @@ pub(crate) fn simulate(simulation: &Simulation) -> Result<Report> {
     analyze_recording(recording?, None).context("virtual sensor")
 }
 
-/// A link to the device on a serial port. The error of a port that is not there, or may not be opened, has a tip.
+/// A link to the device on a serial port. The error has a tip if the port does not exist or may not be opened.
 pub(crate) fn open_link(port: &str, baud: u32) -> Result<SerialLink<impl Read + Write + use<>>> {
     ensure!(!Path::new(port).is_file(), "is a file and no serial port; `imunoise {}` analyses it", Printable(port));
     let port = serial::open(port, baud).map_err(|error| match error.kind() {
@@ -38,7 +38,7 @@ pub(crate) fn open_link(port: &str, baud: u32) -> Result<SerialLink<impl Read + 
     Ok(SerialLink::new(port))
 }
 
-/// Checks a device and prints what passes and what fails.
+/// Checks a device and prints the result of each check.
 pub(crate) fn bench_device(arguments: &BenchArguments) -> Result<()> {
     let BenchArguments { port, baud, second, reads, seconds } = arguments;
     let open = |port: &str| open_link(port, *baud).with_context(|| port.to_owned());
@@ -61,7 +61,7 @@ pub(crate) fn bench_device(arguments: &BenchArguments) -> Result<()> {
 /// Writes `seconds` of the raw bursts of the device on `port` to the frame log `log` and reports on them.
 pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> Result<Report> {
     let mut link = open_link(port, baud).with_context(|| port.to_owned())?;
-    // At a signal the recording ends, the device is told, and what came until then is analysed; a second one ends the program.
+    // A signal ends the recording: the device is told, and the bursts received are analysed. A second signal ends the program.
     let is_interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&is_interrupted);
     interrupt::on_signal(move || !flag.swap(true, Ordering::Relaxed));

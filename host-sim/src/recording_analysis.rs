@@ -1,4 +1,5 @@
-//! The analysis of one recording as a function: a file, bytes or arrays in, a report out; nothing is printed or written.
+//! The analysis of one recording as a function: it takes a file, bytes or arrays and returns a report. Nothing is
+//! printed or written.
 
 use crate::analyze::report;
 use crate::cli::{InputArguments, RecordingArguments, RecordingInMemory};
@@ -12,48 +13,48 @@ use std::sync::Arc;
 
 pub use crate::output::Analysed;
 
-/// Source of a recording.
+/// The source of a recording.
 #[derive(Debug, Clone)]
 pub enum RecordingSource {
-    /// In a file of any format.
+    /// A file of any format.
     File(PathBuf),
-    /// In memory, as the bytes of a file; and its name.
+    /// The bytes of a file in memory, with its name.
     Bytes(String, Arc<[u8]>),
-    /// In arrays; and their name.
+    /// Arrays, with their name.
     Arrays(String, Arc<MemoryTable>),
 }
 
-/// How a recording is read and analysed, as the options of `analyze` say it.
+/// Options for reading and analysing a recording, as those of `analyze`.
 #[derive(Debug, Clone, Default)]
 pub struct AnalysisOptions {
     /// Sample rate, Hz; overrides the time stamps.
     pub rate_hz: Option<f64>,
-    /// Each as in `gyro_x=wx`.
+    /// Assignments such as `gyro_x=wx`.
     pub columns: Vec<String>,
-    /// One per quantity, as in `deg/s`.
+    /// Units, one per quantity, such as `deg/s`.
     pub units: Vec<String>,
-    /// Topic, message or array of a file with several.
+    /// Topic, message or array of a file that has several.
     pub topic: Option<String>,
     /// Name of a sensor, or its profile file.
     pub sensor: Option<String>,
-    /// True if curves and models alone are wanted.
+    /// True if only curves and models are wanted.
     pub is_quick: bool,
 }
 
-/// Why a recording has no report.
+/// The reason for which a recording has no report.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{text}")]
 pub struct AnalysisError {
-    /// In the words of the command: the error, a tip, and the columns of a file that does not say all that is needed.
+    /// Text of the command: the error, a tip, and the columns of a file that lacks information.
     pub text: String,
-    /// The kind of the system's error, where it is one.
+    /// The kind of the system's error, if it is one.
     pub system: Option<ErrorKind>,
 }
 
 /// Analyses a recording; `monitor` may stop its reading.
 ///
 /// # Errors
-/// It cannot be read, or does not say all that is needed.
+/// The recording cannot be read, or lacks information.
 pub fn analyze(
     source: RecordingSource,
     options: AnalysisOptions,

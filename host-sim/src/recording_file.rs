@@ -10,17 +10,16 @@ use recordings::recording::{RecordedSample, Recording};
 use recordings::{count_table_writer, numpy_matrix};
 use std::path::Path;
 
-/// Endings of formats that are read or known and not written.
+/// Endings of formats that are known but not written.
 const NOT_WRITTEN: [&str; 18] = [
     "arrow", "bag", "bin", "db3", "feather", "h5", "hdf5", "json", "mat", "mcap", "npz", "parquet", "pkl", "rda",
     "tdms", "ulg", "xls", "xlsx",
 ];
 
-/// The format that the name of `out` stands for, if none is named: `.npy` is a NumPy array, every other ending that is none of another format
-/// a table.
+/// The format of `out`, by its name if none is `named`: `.npy` is a NumPy array, and every ending that is not of another format a table.
 ///
 /// # Errors
-/// It is the ending of a format that is not written.
+/// The ending is of a format that is not written.
 pub(crate) fn format_of(out: &Path, named: Option<RecordingFormat>) -> Result<RecordingFormat> {
     let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     match named {
@@ -48,12 +47,12 @@ pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat, 
     Ok(())
 }
 
-/// An array does not name its columns.
+/// Prints the names of the columns of an array, whose file does not have them.
 pub(crate) fn note_columns(out: &Path, names: &[String]) {
     note(format_args!("columns of {}: {}", out.display(), names.join(", ")));
 }
 
-/// Writes every sample as the burst that the part would have sent, after the write that selects the range.
+/// Writes every sample as the burst that the part would have sent, after the write that selects the gyro range.
 fn write_frames(recording: &Recording, out: &Path) -> Result<()> {
     let time = |(row, sample): (usize, &RecordedSample)| {
         sample.time_stamp.time_s.with_context(|| format!("sample {row} has no time, which a frame log needs"))

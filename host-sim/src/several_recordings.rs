@@ -1,4 +1,5 @@
-//! The summary of several recordings: whether they agree, and how much noisier they are than one of motors that run.
+//! The summary of several recordings: whether they agree, and how much noisier one is that was recorded while motors
+//! ran.
 
 use crate::output::{self, print};
 use crate::output_files::{OutputFiles, is_standard_stream};
@@ -15,10 +16,10 @@ struct SeveralRecordings<'a> {
     inflation: Option<&'a NoiseInflation>,
 }
 
-/// Prints whether recordings agree, and how much noisier they are than one of motors that run; or writes it as JSON.
+/// Prints whether recordings agree, and how much noisier one with running motors is, or writes both as JSON.
 ///
 /// # Errors
-/// They cannot be compared, or the file cannot be written.
+/// The recordings cannot be compared, or the file cannot be written.
 pub(crate) fn write_several(
     still: &[Measurement],
     running: Option<&Measurement>,

@@ -7,7 +7,7 @@ use crate::recording_file;
 use anyhow::{Context, Result};
 use simulation::Simulation;
 
-/// Length of the recording if none is given, s.
+/// Length of the recording without the option, s.
 const DEFAULT_S: f64 = 3600.0;
 
 /// Runs the simulation and writes the recording.
@@ -23,7 +23,7 @@ pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
     let bar = progress_bar(simulation.samples()?, "{msg} {wide_bar} {pos}/{len} samples, {eta} left");
     bar.set_message("virtual ADIS16405");
     let format = recording_file::format_of(out, arguments.format)?;
-    // A frame log is written as the bus is read: it has the configuration and every fault.
+    // A frame log is written while the bus is read, since it has the configuration and every fault.
     let recording = match format {
         RecordingFormat::Frames => {
             files.write_with(out, |out| Ok(simulation.run_logged(out, |taken| bar.set_position(taken))?))?
@@ -44,7 +44,7 @@ fn simulation(arguments: &SimulateArguments) -> Result<Simulation> {
     (simulation.rate_hz, simulation.range) = (arguments.rate, arguments.range.into());
     let least_taps = 1 << simulation.range.min_filter_taps_log2();
     simulation.set_taps(arguments.taps.unwrap_or(least_taps))?;
-    // Those of one channel come after those of all.
+    // Values for one channel override those for all channels of a kind.
     let (of_one, of_all): (Vec<&ChannelNoise>, _) =
         arguments.noise.iter().partition(|noise| !noise.prefix.ends_with('_'));
     for ChannelNoise { prefix, coefficients } in of_all.into_iter().chain(of_one) {

@@ -1,4 +1,4 @@
-//! The probable intention of the user: names that are similar to one that does not exist.
+//! Tips: names similar to one that does not exist.
 
 use clap::error::{ContextKind, ContextValue};
 use recordings::sample_stream::StreamError;
@@ -8,16 +8,16 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Jaro similarity above which a name is taken for a misspelt one, as the argument parser takes it for options.
+/// Jaro similarity above which a name counts as misspelt; the argument parser has the same limit for options.
 const SIMILAR: f64 = 0.7;
 
-/// Options as other programs call them, and those of this program.
+/// Options of other programs, with those of this program.
 const OPTIONS: [(&str, &str); 4] =
     [("html", "-o report.html"), ("json", "-o report.json"), ("svg", "-o figures.svg"), ("yaml", "-o imu.yaml")];
-/// Words that are no commands, and how they are asked for.
+/// Words that are not commands, with the commands to use instead.
 const COMMANDS: [(&str, &str); 1] = [("explain", "analyze FILE --full")];
 
-/// A name of a sensor that is neither included nor a file: as given, and those that are included.
+/// The name of a sensor that is neither included nor a file, and the names of the included ones.
 #[derive(Debug, thiserror::Error)]
 #[error("sensor {}: none of {}, and no profile file of this name", recordings::Printable(.0), .1.join(", "))]
 pub(crate) struct UnknownSensor(pub(crate) String, pub(crate) Vec<&'static str>);
@@ -39,7 +39,7 @@ pub(crate) fn similar_name<T: AsRef<str>>(name: &str, names: impl IntoIterator<I
     (similarity > SIMILAR).then_some(nearest)
 }
 
-/// Adds to an error of the argument parser how this program calls what was asked for.
+/// Adds the option or command of this program to an error of the argument parser.
 pub(crate) fn suggest(error: &mut clap::Error) {
     let known = |kind, names: &[(&'static str, &'static str)]| {
         let Some(ContextValue::String(given)) = error.get(kind) else { return None };
@@ -83,7 +83,7 @@ pub(crate) fn tip(error: &anyhow::Error) -> Option<String> {
         }
         Reason::UnknownTopic(topic) => {
             let (name, known) = topic.as_ref();
-            // Each with its type in brackets.
+            // Each name is followed by its type in brackets.
             let known = known.split(", ").map(|topic| topic.split(" (").next().unwrap_or(topic));
             Some(format!("did you mean {}?", similar_name(name, known)?))
         }
@@ -91,7 +91,7 @@ pub(crate) fn tip(error: &anyhow::Error) -> Option<String> {
     }
 }
 
-/// The probable meaning of a part of the description of a simulation.
+/// The probable meaning of a misspelt part of a simulation's description.
 fn similar_part(error: &ScenarioTextError) -> Option<String> {
     let similar = match error {
         ScenarioTextError::Kind(kind, known) => similar_name(kind, known.split(", "))?,
@@ -108,7 +108,7 @@ fn similar_part(error: &ScenarioTextError) -> Option<String> {
     Some(format!("did you mean {similar}?"))
 }
 
-/// A file that exists, in place of one that does not: in each folder of its path the entry with this name, or with the most similar one.
+/// An existing file similar to a missing one: in each folder of its path the entry of this name, or the most similar one.
 fn similar_file(file: &Path) -> Option<PathBuf> {
     let name = file.file_name()?.to_string_lossy();
     let parent = file.parent().unwrap_or(Path::new(""));

@@ -1,4 +1,4 @@
-//! Gives the linker the memory map of the emulated board; does nothing for a host build.
+//! Passes the memory map of the emulated board to the linker; does nothing for a host build.
 
 use std::{env, fs, path::PathBuf};
 

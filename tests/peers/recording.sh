@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# Time and memory of this program and of a script of pandas and allantools on the same table, plain and gzip, from the file to the
-# curves, in one run; then of run 1 of the measured recordings, if ADIS_RECORDINGS names their folder, of one virtual hour, and of a table of
-# a million rows beside the recordings of a minute that it is cut into:
+# Prints time and memory of this program and of a script with pandas and allantools, from a file to its curves:
+# - on a table, plain and gzip;
+# - on run 1 of the measured recordings, if ADIS_RECORDINGS names their folder;
+# - on one virtual hour;
+# - on a table of a million rows, and on the same rows as recordings of a minute.
 #
 #     tests/peers/recording.sh [--quick-only] [ROWS…]   (a million rows by default, of six channels)
 #
-# allantools gives the curves alone, `analyze --quick` curves, models, errors and what the trace of the curves finds, `analyze`
-# everything that a report has. With --quick-only neither the script, which does not hold every table, nor the whole analysis, nor what
-# follows the tables runs.
-# A table of a hundred million rows takes 1.6 GB. Installs the script's packages into target/peers.
+# allantools computes only the curves. `analyze --quick` computes curves, models, errors and the findings of the trace of the curves;
+# `analyze` computes the whole report. With --quick-only only `analyze --quick` runs, and only on the tables; the script's memory does not
+# suffice for the largest ones. A table of a hundred million rows takes 1.6 GB. Installs the script's packages into target/peers.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -27,7 +28,7 @@ fi
 python=$target/peers/python/bin/python
 cargo build --release --locked --quiet --package host-sim
 
-# Prints wall time, processor time, the largest memory and the processor time of a row of a command.
+# Prints wall time, processor time, largest memory, and processor time per row of a command.
 measure() {
     local name=$1 rows=$2
     shift 2
@@ -46,7 +47,7 @@ memory = usage.ru_maxrss / 1024
 print(f"{name:<36} {wall:8.2f} s {work:8.2f} s of processor {memory:7.0f} MB {1e6 * work / rows:8.3f} us a row", flush=True)
 MEASURE
 }
-# The table of so many rows, which is made once.
+# Prints the path of a table with this number of rows, which is written once.
 table_of() {
     [ -f "$folder/$1.csv" ] || "$python" tests/peers/recording/table.py "$1" "$folder/$1.csv"
     echo "$folder/$1.csv"
@@ -81,7 +82,7 @@ fi
 echo "virtual hour"
 hour=$((3600 * 2048 / 10))
 measure "imunoise" "$hour" "$target/release/imunoise" demo -o "$folder/page.html" --force --quiet
-# 166 recordings of a minute at 100 Hz.
+# The table is divided into 166 recordings of a minute at 100 Hz.
 rows=996000 minute=6000
 table=$(table_of "$rows")
 minutes=$folder/minutes

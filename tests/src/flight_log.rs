@@ -1,11 +1,11 @@
 //! A log of PX4 that a test writes (ULog file format).
 
-/// The bytes of a log: its header, and then its messages.
+/// The bytes of a log: a header, then messages.
 #[derive(Debug)]
 pub struct FlightLog(pub Vec<u8>);
 
 impl FlightLog {
-    /// A log without messages, of version 1 and begun at 0.
+    /// A log of version 1 that begins at time 0 and has no messages.
     pub fn empty() -> Self {
         Self([&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat())
     }

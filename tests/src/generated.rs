@@ -1,26 +1,26 @@
-//! Parts of the pages of the documentation that tests generate.
+//! Parts of documentation pages that tests generate.
 //!
-//! A part stands between `<!-- begin NAME -->` and `<!-- end NAME -->`, on lines of their own or within a line after a word. The
-//! test that calls [`generated`] fails if the part is another text. `tests/docs.sh` sets `WRITE_DOCS`, with which the call writes the
-//! part. The name of such a test has the words `in_the_docs`, by which the script finds it.
+//! A part is between `<!-- begin NAME -->` and `<!-- end NAME -->`, each on its own line or within a line after a word. The test that calls
+//! [`generated`] fails if the text of the part differs. `tests/docs.sh` sets `WRITE_DOCS`, with which the call writes the part instead. The
+//! name of such a test contains `in_the_docs`, by which the script finds it.
 
 use crate::{one_at_a_time, replace, target_folder, workspace};
 use std::path::Path;
 
-/// Asserts that the part `name` of a page is `text`, or writes it. `page` is the path from the folder of the workspace.
+/// Asserts that the part `name` of a page is `text`, or writes it. `page` is the path relative to the workspace.
 ///
 /// # Panics
-/// If the page has no such part, or another text in it that is not to be written.
+/// The page has no such part, or the part differs and must not be written.
 #[track_caller]
 pub fn generated(page: &str, name: &str, text: &str) {
     Part { root: workspace(), page, name }.check(text, |old, new| old == new, writes_docs());
 }
 
-/// [`generated`] for measured figures: a part is as it should be if its words are those of `text`, and each number differs by at most
-/// this part of the page's. A text within the tolerance is never written.
+/// [`generated`] for measured figures. The words of the part must be those of `text`, and each number may differ by the relative
+/// `tolerance`. A text within the tolerance is not written.
 ///
 /// # Panics
-/// As [`generated`].
+/// Those of [`generated`].
 #[track_caller]
 pub fn generated_within(page: &str, name: &str, text: &str, tolerance: f64) {
     Part { root: workspace(), page, name }.check(text, |old, new| is_within(old, new, tolerance), writes_docs());
@@ -42,7 +42,7 @@ impl Part<'_> {
     fn check(&self, text: &str, is_unchanged: impl Fn(&str, &str) -> bool, writes: bool) {
         let Self { root, page: name_of_page, name } = self;
         let path = root.join(name_of_page);
-        // Another test may write another part of the page.
+        // Another test may write a part of the same page at the same time.
         let _writing = writes.then(|| one_at_a_time(&target_folder().join("writing-docs")));
         let page = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{name_of_page}: {error}"));
         let [begin, end] = ["begin", "end"].map(|side| format!("<!-- {side} {name} -->"));
@@ -54,7 +54,7 @@ impl Part<'_> {
         let Some((before, (old, after))) = parts else {
             panic!("{name_of_page}: the part \"{name}\" ends before it begins");
         };
-        // Markdown takes a line that begins with a mark for a block of its own.
+        // Markdown treats a line that begins with a mark as a separate block.
         let is_in_line = before.rsplit('\n').next().is_some_and(|line| !line.trim().is_empty());
         assert!(
             is_in_line || old.starts_with('\n'),
@@ -75,21 +75,21 @@ impl Part<'_> {
     }
 }
 
-/// True if two texts have the same words, and numbers that differ by at most this part of those of the first.
+/// True if two texts have the same words, and numbers within a relative tolerance of those of the first.
 fn is_within(old: &str, new: &str, tolerance: f64) -> bool {
     let [old, new] = [old, new].map(WordsAndNumbers::of);
     let is_near = |(old, new): (&f64, &f64)| (new - old).abs() <= tolerance * old.abs();
     old.words == new.words && old.numbers.iter().zip(&new.numbers).all(is_near)
 }
 
-/// A text that is divided at its numbers.
+/// A text divided at its numbers.
 struct WordsAndNumbers {
     words: Vec<String>,
     numbers: Vec<f64>,
 }
 
 impl WordsAndNumbers {
-    /// A number has digits, perhaps in groups of three, perhaps decimals, and perhaps the word "million" behind it.
+    /// Divides a text. A number has digits, optionally in groups of three, decimals, and the word "million" after it.
     fn of(text: &str) -> Self {
         let (mut words, mut numbers, mut rest) = (vec![String::new()], Vec::new(), text);
         while let Some(first) = rest.chars().next() {
@@ -110,7 +110,7 @@ impl WordsAndNumbers {
     }
 }
 
-/// The number of bytes at the beginning of a text that are a number's.
+/// Length in bytes of the number at the begin of a text.
 fn length_of_number(text: &str) -> usize {
     let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
     let mut length = digits(text);
@@ -131,7 +131,7 @@ mod tests {
 
     const PAGE: &str = "A page\n\n<!-- begin table -->\n| a | 1 |\n<!-- end table -->\n\nA push takes <!-- begin cost -->198<!-- end cost --> steps.\n";
 
-    /// A page in a folder of its own, which is removed with it.
+    /// A page in its own temporary folder.
     struct Example(std::path::PathBuf);
 
     impl Example {
@@ -150,7 +150,7 @@ mod tests {
             std::fs::read_to_string(self.0.join("page.md")).expect("the page")
         }
 
-        /// Refusal of a part that is not this text.
+        /// The message with which this text of a part is refused.
         fn refusal(&self, name: &str, text: &str) -> String {
             let check = || self.part(name).check(text, |old, new| old == new, false);
             let panic = catch_unwind(AssertUnwindSafe(check)).expect_err("the part is refused");

@@ -1,7 +1,7 @@
-//! Shared by the tests of several crates: the measured recordings, the program, generated documentation, pseudo-terminals, and the report
+//! Code shared by the tests of several crates: measured recordings, the program, generated documentation, pseudo-terminals, and the report
 //! of a skipped test.
 //!
-//! The tests of the noise observatory as a whole live in `tests/`.
+//! The tests of the whole noise observatory are in `tests/`.
 
 mod flight_log;
 mod generated;
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// Two connected pseudo-terminals, of which reading and writing give up after `timeout`, and the name of the second one.
+/// Two connected pseudo-terminals whose reads and writes end after `timeout`, and the name of the second one.
 pub fn pseudo_terminals(timeout: Duration) -> (SerialPort, SerialPort, String) {
     let (mut near, far) = SerialPort::pair().expect("a pseudo-terminal");
     near.set_read_timeout(timeout).and_then(|()| near.set_write_timeout(timeout)).expect("a timeout");
@@ -30,8 +30,8 @@ pub fn pseudo_terminals(timeout: Duration) -> (SerialPort, SerialPort, String) {
     (near, far, name.display().to_string())
 }
 
-/// The path of a measured recording in the folder that `ADIS_RECORDINGS` names. If it is absent, the test is reported as
-/// skipped, and should return. Nothing else reads the variable, which a test of the architecture checks.
+/// The path of a measured recording in the folder of `ADIS_RECORDINGS`. If it does not exist, the test is reported as
+/// skipped and should return. A test of the architecture checks that only this function reads the variable.
 pub fn recording(test: &str, file: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("ADIS_RECORDINGS").map(PathBuf::from);
     let path = folder.map(|folder| folder.join(file)).filter(|path| path.exists());
@@ -41,19 +41,19 @@ pub fn recording(test: &str, file: &str) -> Option<PathBuf> {
     path
 }
 
-/// Reports on standard error that a test was skipped, and appends `TEST: REASON` to the file that `SKIPPED_TESTS` names,
-/// of which `run.sh` counts the tests.
+/// Reports on standard error that a test was skipped, and appends `TEST: REASON` to the file of `SKIPPED_TESTS`, from
+/// which `run.sh` counts them.
 pub fn note_skipped(test: &str, reason: &str) {
-    // The output of `eprintln!` would be captured by the test harness.
+    // The test harness would capture the output of `eprintln!`.
     writeln!(std::io::stderr(), "skipped {test}: {reason}").expect("standard error");
     if let Some(file) = std::env::var_os("SKIPPED_TESTS") {
         let mut file = OpenOptions::new().create(true).append(true).open(file).expect("the file for skipped tests");
-        // A single write keeps the lines of tests that run at the same time whole.
+        // A single write keeps the lines of simultaneous tests intact.
         file.write_all(format!("{test}: {reason}\n").as_bytes()).expect("room");
     }
 }
 
-/// The path of the program: that which `IMUNOISE` names, or built by cargo in the profile of the tests.
+/// The path of the program: that of `IMUNOISE`, or else built by cargo in the profile of the tests.
 pub fn host_sim() -> PathBuf {
     if let Some(program) = std::env::var_os("IMUNOISE") {
         return program.into();
@@ -64,7 +64,7 @@ pub fn host_sim() -> PathBuf {
     test.ancestors().nth(2).expect("target/debug").join("imunoise")
 }
 
-/// The path of a program of the workspace `tests/tools`, which is built if it is not there.
+/// The path of a program of the workspace `tests/tools`, which is built if it does not exist.
 pub fn tool(name: &str) -> PathBuf {
     let target = target_folder().join("programs");
     let mut build = cargo();
@@ -84,12 +84,13 @@ pub struct Image<'a> {
     pub profile: &'a str,
     /// Further arguments of cargo, such as features.
     pub arguments: &'a [&'a str],
-    /// A variable of the environment and its value, which the program is compiled with.
+    /// An environment variable and its value for the compilation.
     pub variable: Option<(&'a str, &'a str)>,
 }
 
 impl Image<'_> {
-    /// Builds the image `observatory-{board}` as it is flashed, with further features, and returns the path of its ELF.
+    /// Builds the image `observatory-{board}` as for flashing, with `further` features, and returns the path of its
+    /// ELF.
     pub fn of_board(board: &str, target: &str, further: &[&str]) -> PathBuf {
         let (feature, program) = (format!("board-{board}"), format!("observatory-{board}"));
         let copy = [&[program.as_str()], further].concat().join("-");
@@ -99,8 +100,8 @@ impl Image<'_> {
             .build(&copy)
     }
 
-    /// Builds the program and returns the path of a copy of its ELF with the name `copy`: cargo overwrites a program when it builds it
-    /// with other features.
+    /// Builds the program and returns the path of a copy of its ELF with the name `copy`. The copy is needed, since cargo overwrites a
+    /// program that is built with other features.
     pub fn build(self, copy: &str) -> PathBuf {
         let folder = image_folder();
         // Another test may build the same program with other features.
@@ -122,7 +123,7 @@ impl Image<'_> {
     }
 }
 
-/// Runs a script of the workspace with the Python that `ADIS_PYTHON` names, and returns what it prints; `None`, with a note, without one.
+/// Runs a script of the workspace with the Python of `ADIS_PYTHON`, and returns its output; `None`, with a note, without Python.
 pub fn python(test: &str, script: &str, arguments: &[&str]) -> Option<Vec<u8>> {
     let Some(python) = std::env::var_os("ADIS_PYTHON").filter(|python| Path::new(python).exists()) else {
         note_skipped(test, "ADIS_PYTHON names no Python with the packages of tests/requirements.txt");
@@ -133,16 +134,16 @@ pub fn python(test: &str, script: &str, arguments: &[&str]) -> Option<Vec<u8>> {
     Some(output.stdout)
 }
 
-/// The folder of files that other programs wrote, with `truth.json`, which says what each holds; `None`, with a note, without Python.
+/// The folder of files that other programs wrote, with their contents in `truth.json`; `None`, with a note, without Python.
 pub fn recorded_samples(test: &str) -> Option<PathBuf> {
     const SCRIPT: &str = "host-sim/recordings/tests/make_samples.py";
     let script = std::fs::read(workspace().join(SCRIPT)).expect("the script");
     let folder = target_folder().join("tmp/samples");
-    // The first test writes the files, for as long as the script is the same.
+    // The first test writes the files; they stay while the script does not change.
     let _writing = one_at_a_time(&folder.with_extension("lock"));
     let written_by = folder.join("written-by.py");
     if std::fs::read(&written_by).ok().as_ref() != Some(&script) {
-        // The writers of bags refuse a file that exists.
+        // The writers of bags refuse an existing file.
         let _ = std::fs::remove_dir_all(&folder);
         python(test, SCRIPT, &[folder.to_str().expect("UTF-8")])?;
         std::fs::write(written_by, script).expect("room");
@@ -150,7 +151,7 @@ pub fn recorded_samples(test: &str) -> Option<PathBuf> {
     Some(folder)
 }
 
-/// Waits until no other process holds this file, which is made with its folder; it is held until it is dropped. Each test is a process.
+/// Waits until no other process holds this file, which is created with its folder. It is held until it is dropped. Each test is a process.
 pub fn one_at_a_time(file: &Path) -> File {
     std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
     let held = File::create(file).expect("a file");
@@ -158,7 +159,7 @@ pub fn one_at_a_time(file: &Path) -> File {
     held
 }
 
-/// Writes a file under another name and renames it when it is whole: another test may be reading the one before.
+/// Writes a file under another name and then renames it, since another test may read the old one.
 fn replace(file: &Path, write: impl FnOnce(&Path) -> std::io::Result<()>) {
     let partial = file.with_extension(std::process::id().to_string());
     write(&partial).expect("room");
@@ -175,12 +176,12 @@ pub fn target_folder() -> PathBuf {
     workspace().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// The target folder of what is built for microcontrollers.
+/// The target folder of programs for microcontrollers.
 pub fn image_folder() -> PathBuf {
     target_folder().join("image")
 }
 
-/// The cargo that runs the tests, in the folder of the workspace.
+/// The cargo that runs the tests, started in the workspace.
 pub fn cargo() -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(workspace());

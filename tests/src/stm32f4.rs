@@ -1,4 +1,4 @@
-//! The images for an STM32F405, run in the emulator of it, a program of `tests/tools`.
+//! Runs images for an STM32F405 in its emulator, a program of `tests/tools`.
 
 use crate::{Image, tool};
 use emulation::{Outcome, Scenario};
@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 /// Rust's name of a Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The image for the Olimex STM32-H405, built at most once a run; `OBSERVATORY_IMAGE` names another.
+/// The image for the Olimex STM32-H405, built at most once per run; `OBSERVATORY_IMAGE` names another image.
 pub fn h405_image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
     let build = || Image::of_board("h405", TARGET, &[]);
@@ -31,23 +31,22 @@ pub fn run(image: &Path, scenario: Scenario) -> Outcome {
     Outcome::from_bytes(&output.stdout).expect("the results of the run")
 }
 
-/// Commands that are typed one after the other on the console of an emulated board, from the time at which it has probed its sensor: that is
-/// left alone for its start-up.
+/// Commands typed one after the other on the console of an emulated board. They begin after the start-up and the probe of the sensor.
 #[derive(Debug)]
 pub struct Typed {
-    /// Each with its time in s.
+    /// The commands with their times in s.
     commands: Vec<(f64, String)>,
-    /// Time after the answer to the last one, s.
+    /// Time of the end, after the answer to the last command, s.
     pub end_s: f64,
 }
 
 impl Typed {
-    /// Without a command.
+    /// No command.
     pub fn nothing() -> Self {
         Self { commands: Vec::new(), end_s: 0.8 }
     }
 
-    /// And then a command, with so many seconds for its answer.
+    /// Appends a command, with the time for its answer in s.
     #[must_use]
     pub fn then(mut self, command: &str, seconds: f64) -> Self {
         self.commands.push((self.end_s, command.to_owned()));
@@ -55,7 +54,7 @@ impl Typed {
         self
     }
 
-    /// And then the steps of the bench, each with the longest time for its answer in s, on a board whose report takes `report_s`.
+    /// Appends the steps of the bench, each with its longest time in s, on a board whose report takes `report_s`.
     #[must_use]
     pub fn then_steps(self, steps: impl IntoIterator<Item = (String, f64)>, report_s: f64) -> Self {
         steps.into_iter().fold(self, |typed, (command, longest_s)| {
@@ -64,12 +63,12 @@ impl Typed {
         })
     }
 
-    /// The times, in s, and the keys.
+    /// The keys with their times in s.
     pub fn keys(&self) -> impl Iterator<Item = (f64, String)> {
         self.commands.iter().map(|(at_s, command)| (*at_s, format!("{command}\r")))
     }
 
-    /// The commands, each with the bytes up to the next one of what a port has sent, each byte with its time in ns.
+    /// Splits what a port has sent, bytes with their times in ns, into the answers to each command.
     pub fn answers(&self, received: &[(u64, u8)]) -> Vec<(&str, Vec<u8>)> {
         let ends = self.commands.iter().skip(1).map(|(at_s, _)| at_s * 1e9).chain([f64::INFINITY]);
         let mut bytes = received.iter().peekable();
@@ -84,8 +83,8 @@ impl Typed {
     }
 }
 
-/// Time in s that is enough for the answer to a step of the bench by an emulated board whose report takes `report_s`; the step itself
-/// allows `longest_s`.
+/// Sufficient time in s for the answer of an emulated board to a step of the bench; the board's report takes `report_s`, and the step
+/// itself allows `longest_s`.
 fn answer_time(command: &str, longest_s: f64, report_s: f64) -> f64 {
     match command.split(' ').next().unwrap_or_default() {
         "w" if command == "w 1" => longest_s,

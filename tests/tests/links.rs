@@ -1,4 +1,4 @@
-//! Links of the documentation: each file that a page names is there, and each section has the heading.
+//! Links of the documentation: each linked file exists, and each linked section has its heading.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the workspace")
 }
 
-/// The pages: Markdown of the root and of the folders that hold documentation.
+/// The pages: Markdown files of the root and of the folders with documentation.
 fn pages() -> Vec<PathBuf> {
     let folders =
         ["", "docs", "adis16405-driver", "allan-core", "allan-core/guide", "allan-core/ffi", "host-sim/python"];
@@ -28,7 +28,7 @@ fn prose(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// The name by which a heading is linked: small letters, a hyphen for each space, no punctuation.
+/// The anchor of a heading: lower case, a hyphen for each space, no punctuation.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim().to_lowercase();
     let kept = kept.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
@@ -45,14 +45,14 @@ fn destinations(line: &str) -> impl Iterator<Item = &str> {
     line.split("](").skip(1).filter_map(|rest| rest.split(')').next())
 }
 
-/// Faults of the links of a page.
+/// Broken links of a page.
 fn broken(page: &Path, read: &mut HashMap<PathBuf, Vec<String>>) -> Vec<String> {
     let text = std::fs::read_to_string(page).expect("UTF-8");
     let mut wrong = Vec::new();
     for (line, destination) in
         prose(&text).flat_map(|(number, line)| destinations(line).map(move |found| (number, found)))
     {
-        // Addresses, and items of a crate, whose links rustdoc checks.
+        // Addresses are not checked; rustdoc checks links to items of a crate.
         if destination.contains("://") || destination.contains("::") {
             continue;
         }

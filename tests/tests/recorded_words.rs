@@ -1,5 +1,5 @@
-//! Decoding of output words and bursts that were recorded from real ADIS16405s at rest (psas/stm32,
-//! `adis16405_log.txt-example`; psas/Launch-10).
+//! Decoding of output words and bursts recorded from real ADIS16405s at rest (psas/stm32, `adis16405_log.txt-example`;
+//! psas/Launch-10).
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -58,8 +58,8 @@ fn recorded_words_are_those_of_a_sensor_at_rest() {
         rates.sort_by(f64::total_cmp);
         let median = rates[rates.len() / 2];
         assert!(median.abs() < 3.0, "initial bias error is ±3 deg/s, {:?} shows {median}", COLUMNS[gyro]);
-        // Noise density 0.05 deg/s/sqrt(Hz) up to 409.6 Hz, through two averages of four (sum of squared weights
-        // 44/256), is 0.42 deg/s: 1.7 % of the rows may deviate by more than 1 deg/s, none by more than five times
+        // A noise density of 0.05 deg/s/sqrt(Hz) up to 409.6 Hz, through two averages of four (sum of squared weights
+        // 44/256), is 0.42 deg/s. Of the rows 1.7 % may deviate by more than 1 deg/s, and none by more than five times
         // 0.42.
         let outliers = rates.iter().filter(|rate| (*rate - median).abs() >= 1.0).count();
         assert!(outliers * 1000 <= rates.len() * 17, "{:?}: {outliers} rows deviate from {median}", COLUMNS[gyro]);
@@ -68,7 +68,7 @@ fn recorded_words_are_those_of_a_sensor_at_rest() {
     }
 }
 
-/// The recorded counts are encoded into words by plain arithmetic; the driver must decode the same counts from them.
+/// The recorded counts are encoded into words by plain arithmetic, from which the driver must decode the same counts.
 #[test]
 fn recorded_bursts_are_decoded_and_their_repetitions_are_usable() {
     let test = "recorded_bursts_are_decoded_and_their_repetitions_are_usable";
@@ -103,6 +103,7 @@ fn recorded_bursts_are_decoded_and_their_repetitions_are_usable() {
         previous = burst;
         bursts += 1;
     }
-    // 37 of the 45 repetitions of the inertial words differ in other words: new samples, equal by chance.
+    // 37 of the 45 repetitions of the inertial words differ in other words, so they are new samples that are equal by
+    // chance.
     assert_eq!((bursts, validator.counters().get(Faults::REPEATED), other_words), (49_425, 45, 37));
 }

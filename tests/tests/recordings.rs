@@ -1,11 +1,11 @@
-//! Measured recordings through the whole system, compared with figures published for them.
+//! Measured recordings through the whole system, compared with published figures.
 
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
 use system_tests::{host_sim, recording};
 
-/// Runs the command-line program and returns its JSON report without the name, the hash and the options of what was read.
+/// Runs the command-line program and returns its JSON report without the name, hash and options of the recording.
 fn report(arguments: &[&str], recording: &PathBuf) -> Value {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let json = folder.path().join("report.json");
@@ -24,7 +24,7 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Value {
     but_reading(&serde_json::from_slice(&std::fs::read(json).expect("the report")).expect("JSON"))
 }
 
-/// The report without the name, the hash and the options of what was read.
+/// The report without the name, hash and options of the recording.
 pub(crate) fn but_reading(report: &Value) -> Value {
     let mut report = report.clone();
     report.as_object_mut().and_then(|fields| fields.remove("reading"));
@@ -36,7 +36,7 @@ fn channel<'a>(report: &'a Value, name: &str) -> &'a Value {
     channels.iter().find(|channel| channel["name"] == name).expect("the channel")
 }
 
-/// Overlapping Allan deviations of gyro X at 0.02, 0.04 … s, as SMAC-Group/avar publishes them for this recording.
+/// Overlapping Allan deviations of gyro X at 0.02, 0.04 … s that SMAC-Group/avar publishes for this recording.
 const RUN_1_GYRO_X: [f64; 15] = [
     0.2575, 0.1928, 0.1395, 0.1000, 0.07115, 0.05107, 0.03612, 0.02589, 0.01830, 0.01321, 0.01002, 0.008274, 0.007063,
     0.007641, 0.007768,
@@ -58,8 +58,8 @@ fn a_static_recording_has_the_published_deviations_analyzed_and_replayed() {
         let point = &curve[k + 1];
         let (tau, adev) = (point["tau_s"].as_f64().expect("τ"), point["adev"].as_f64().expect("σ"));
         assert!((tau - 0.02 * f64::from(1 << k)).abs() < 1e-9);
-        // Full overlap up to n = 8; beyond, the estimator takes every n/8-th window of the published ones, which moves
-        // the estimate by a fraction of its own uncertainty.
+        // The overlap is full up to n = 8. Beyond, the estimator takes every n/8-th window of the published ones, which
+        // changes the estimate by a fraction of its uncertainty.
         let tolerance = match point["n"].as_u64() {
             Some(..=8) => 5e-5,
             _ if tau <= 1.0 => 0.01 * expected,

@@ -1,5 +1,5 @@
-//! An image that is built twice from one source is the same to the byte, whatever the folder: what runs on a board can be compared with its
-//! source. `CARGO_HOME`, whose path is in panic messages of other people's crates, is the same in both.
+//! Two builds of an image from one source are equal byte for byte in any folder, so an image on a board can be compared with its source.
+//! `CARGO_HOME` is the same in both, since its path is in panic messages of dependencies.
 
 use image_file::uf2;
 use std::fs;
@@ -9,7 +9,7 @@ use tempfile::tempdir;
 
 const TARGET: &str = "thumbv6m-none-eabi";
 
-/// The file for the boot loader of the Pico, built from nothing of a copy of the workspace in `folder`.
+/// The file for the Pico's boot loader, built from a copy of the workspace in `folder` without earlier results.
 fn built_in(folder: &Path) -> Vec<u8> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace");
     let listed = Command::new("git").current_dir(workspace).args(["ls-files", "-z"]).output().expect("git");

@@ -1,4 +1,5 @@
-//! The wires from the sensor to the boards, and its levels: one table and one sentence, on every page and in every source.
+//! The wires from the sensor to the boards, and the levels: one table and one sentence, the same on every page and in
+//! every source.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -30,7 +31,7 @@ const LEVELS: &str = "\
 The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider or a
 level shifter (data sheet Rev. B, page 5).";
 
-/// Sentences on levels that are wrong.
+/// Wrong sentences on levels.
 const WRONG: [&str; 4] = ["5 V tolerant", "tolerate 5 V", "may drive 5 V", "may reach 5 V"];
 
 #[test]
@@ -48,10 +49,10 @@ fn the_wires_and_levels_are_in_the_docs() {
     }
 }
 
-/// The pin of a board that a wire goes to.
+/// The pin of a board to which a wire goes.
 type PinOfBoard = fn(&Wire) -> &str;
 
-/// The sources of the images say which pin each signal of the sensor is connected to: those of the table.
+/// The sources of the images state the pin of each signal, which must be that of the table.
 #[test]
 fn the_wires_are_those_of_the_images() {
     let boards: [(&str, PinOfBoard); 3] = [
@@ -86,13 +87,13 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The words of a text without the marks of comments, tables and Markdown.
+/// The words of a text without comment marks, tables and Markdown.
 fn words(text: &str) -> String {
     let words = text.split_whitespace().filter(|word| !["//!", "///", "//", "|"].contains(word));
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Pins that "may drive 5 V" get a divider, behind which the sensor cannot be read.
+/// Pins that "may drive 5 V" would get a divider, through which the sensor cannot be read.
 #[test]
 fn one_sentence_on_levels_stands_everywhere() {
     let levels = words(LEVELS);
@@ -110,6 +111,6 @@ fn one_sentence_on_levels_stands_everywhere() {
             assert!(!rest.contains(wrong), "{}: {wrong:?} is not the sentence on levels", file.display());
         }
     }
-    // Three pages, five examples of the driver, three boards.
+    // These are three pages, five examples of the driver and three boards.
     assert!(stated >= 8, "{stated}");
 }

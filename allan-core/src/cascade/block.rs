@@ -18,7 +18,7 @@ struct Sums<W> {
     past: u64,
     /// Number of sums of the block at this level.
     new: usize,
-    /// Octaves whose differences had 14 bits or more in the last block, as bits: there the fast sums for less are not tried.
+    /// Bit set of the octaves whose differences had 14 bits or more in the last block: sums for smaller ones are not tried.
     large: u64,
 }
 
@@ -37,7 +37,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         if cfg!(target_pointer_width = "32") {
             return samples.iter().for_each(|&sample| self.push(sample));
         }
-        // A block costs as much as some samples; the first sample after a gap closes it.
+        // Few samples are cheaper one by one, and the first sample after a gap closes it.
         let single = if samples.len() < SHORTEST_BLOCK { samples.len() } else { usize::from(self.pending > 0) };
         let (single, samples) = samples.split_at(single);
         single.iter().for_each(|&sample| self.push(sample));
@@ -240,7 +240,8 @@ const SMALL: u32 = 1 << 13;
 /// Bits of a difference, and of a half of its square, in [`middle_powers`].
 const HALF: u32 = 26;
 
-/// `None` if a difference has 14 bits or more: the fourth powers of a block of 13-bit differences fill 62 bits.
+/// Sums of the powers of differences below [`SMALL`]: the fourth powers of a block fill 62 bits. `None` if a difference
+/// has 14 bits or more.
 fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
     let [(newest, last_newest), (middle, last_middle), (oldest, last_oldest)] = sums.map(<[i32]>::as_chunks);
     let (mut digits, mut squares, mut fourths) = (0, 0_u64, 0_u64);
@@ -262,9 +263,9 @@ fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
     (digits < SMALL).then_some((squares.into(), fourths.into()))
 }
 
-/// Sums of the powers of some differences, right if all of them are below [`SMALL`].
+/// Sums of the powers of some differences, valid only if all of them are below [`SMALL`].
 struct LanePowers {
-    /// Bits of the magnitudes, right in any case.
+    /// Bitwise or of the magnitudes, valid for any differences.
     digits: u32,
     squares: u64,
     fourths: u64,
@@ -305,7 +306,8 @@ fn middle_powers(sums: [&[i32]; 3]) -> Option<((u128, u128), u32)> {
     (digits < 1 << HALF).then_some(((squares.into(), fourths), digits))
 }
 
-/// `None` if a difference has 29 bits or more: the fourth powers of a block of 28-bit differences fill 122 bits.
+/// Sums of the powers of differences of up to 28 bits: the fourth powers of a block fill 122 bits. `None` if a
+/// difference has 29 bits or more.
 fn wide_powers<W: Word>(sums: [&[W]; 3], bits: u32) -> Option<(u128, u128)> {
     let square = |factor: i64| u128::from(factor.wrapping_mul(factor) as u64);
     let (mut digits, mut squares, mut fourths) = (0, 0_u128, 0_u128);

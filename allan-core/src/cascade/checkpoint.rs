@@ -29,9 +29,10 @@ impl OctaveSums {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
-    /// The Allan variance, in counts², of every octave that has at least one difference.
+    /// The Allan variance, in counts², of every octave that has at least one difference, shortest first.
     ///
-    /// `sample_period` is in seconds; a [`fit`](crate::fit::fit) gives the confidence of the fitted mixture of noises.
+    /// `sample_period` is in seconds. Degrees of freedom and 95 % bounds are those of the power law that dominates at
+    /// each point; a [`fit`](crate::fit::fit) uses the fitted mixture of noises instead.
     ///
     /// # Cost
     /// | `Cascade::curve` | Cortex-M4F | Cortex-M0+ |
@@ -50,7 +51,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve
     }
 
-    /// The sums of an octave; `None` beyond the last.
+    /// The sums at `n = 2^octave`; `None` beyond the last octave.
     #[must_use]
     pub fn octave_sums(&self, octave: usize) -> Option<OctaveSums> {
         let Octave { moments, interpolation, .. } = *self.octaves.get(octave)?;
@@ -60,8 +61,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Replaces the state by one with these sums of `samples` samples; `missing` more were missing.
     ///
-    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave; no difference will contain samples from
-    /// before and after.
+    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave, which are not checked. No difference contains
+    /// samples from before and after this call.
     ///
     /// # Cost
     /// | `Cascade::restore` | Cortex-M4F | Cortex-M0+ |
@@ -103,9 +104,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// The [`curve`](Self::curve) without confidence: less flash, and a small part of the instructions.
     ///
-    /// Variances have a relative error below 10⁻⁶, bounds of 0 and infinity, no kurtosis, and white noise as their
-    /// type; the degrees of freedom are a lower limit. A [`fit`](crate::fit::fit) gives nearly the same coefficients
-    /// from both curves.
+    /// `sample_period` is in seconds. Variances have a relative error below 10⁻⁶, bounds of 0 and infinity, no kurtosis,
+    /// and white noise as their type; the degrees of freedom are a lower limit. A [`fit`](crate::fit::fit) gives nearly
+    /// the same coefficients from both curves.
     ///
     /// # Cost
     /// | `Cascade::curve_without_confidence` | Cortex-M4F | Cortex-M0+ |
@@ -124,7 +125,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve
     }
 
-    /// As [`rebuild_curve`](Self::rebuild_curve), for [`curve_without_confidence`](Self::curve_without_confidence).
+    /// Makes `curve` the [`curve_without_confidence`](Self::curve_without_confidence) of `samples` samples every
+    /// `sample_period` seconds, with the octave sums that `sums` returns.
     pub fn rebuild_without_confidence(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,
@@ -133,7 +135,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     ) {
         let points = Self::points(samples, sums, |octave, sums, overlap, added: AddedVariance<f32>| {
             let n = 1_u64 << octave;
-            // Divided by one factor after the other, so that no intermediate value leaves the range of single precision.
+            // One division per factor keeps every intermediate value within the range of single precision.
             let measured = sums.squares as f32 / sums.count as f32 / n as f32 / (2 * n) as f32;
             let interpolation = added.subtracted(measured);
             AllanPoint {
@@ -147,7 +149,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve.fill_without_confidence(sample_period, samples, points);
     }
 
-    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples with the sums of each octave that `sums` returns.
+    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples every `sample_period` seconds, with the octave sums
+    /// that `sums` returns.
     pub fn rebuild_curve(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,
@@ -205,7 +208,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
     /// # Errors
-    /// The error says what is wrong with the state.
+    /// The state has another version, type or size, a wrong checksum, or values that no samples lead to.
     pub fn read_serialized<'de, D: serde::Deserializer<'de>>(&mut self, deserializer: D) -> Result<(), D::Error> {
         crate::serialized::deserialize_in_place(deserializer, self)
     }
@@ -213,7 +216,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// True if a serialised state has the version and the size of this type and a correct checksum.
     ///
     /// # Errors
-    /// The error says what is wrong with the state.
+    /// The state has another version, type or size, or a wrong checksum.
     pub fn check_serialized<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
         crate::serialized::check::<Self, D>(deserializer)
     }
@@ -266,7 +269,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
             return Some("the newest running sum is not the running sum");
         }
         for (k, octave) in self.octaves.iter().enumerate() {
-            // Sums of steps up to the start of the stretch are 0.
+            // The sums of steps before the first sample are 0.
             let step = self.elapsed >> k.saturating_sub(Self::FINE);
             let empty = |back: u64| step <= back && octave.line[Self::slot(step.wrapping_sub(back))] != 0;
             if (OVERLAP as u64..2 * OVERLAP as u64).any(empty) {

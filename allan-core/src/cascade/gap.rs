@@ -29,7 +29,7 @@ impl Bridge {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
-    /// The octave from which on gaps of one sample are bridged, and no gap has more than one difference within it.
+    /// The shortest octave that bridges a gap of one sample. A bridged gap has at most one difference within it.
     pub(crate) const SHORTEST_BRIDGING: usize =
         if OVERLAP as u64 > REACH { OVERLAP.trailing_zeros() as usize } else { REACH.trailing_zeros() as usize };
 
@@ -55,7 +55,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Closes the pending gap before `next`; out of line, as its locals would take the registers of every sample.
+    /// Closes the pending gap before `next`. It is kept out of line: its locals would take registers from every sample.
     #[cold]
     #[inline(never)]
     pub(super) fn close_gap(&mut self, next: i32) {
@@ -85,7 +85,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.settling = self.settling_time();
     }
 
-    /// [`settling`](Cascade::settling) by the gaps of the octaves below [`ROUNDED`](crate::moments::ROUNDED).
+    /// Computes [`settling`](Cascade::settling) from the gaps of the octaves below
+    /// [`ROUNDED`](crate::moments::ROUNDED).
     pub(super) fn settling_time(&self) -> u32 {
         let complete = |(k, octave): (usize, &Octave<OVERLAP>)| octave.resumed + (2 << k);
         let settled = self.octaves[..Self::FINE + Self::SHORT].iter().enumerate().map(complete).max();
@@ -123,7 +124,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         if !known || width == 0 {
             return;
         }
-        // Without strides the newest sample takes the part of the one after the gap.
+        // At level 0 the newest sample stands for the one after the gap.
         let end = if level == 0 { newest - 1 } else { newest };
         let [first, start, end] = [newest - 3 * width, end - width, end].map(|step| self.sum_at(level, step));
         let after = if level == 0 { self.sum.wrapping_sub(end) } else { 0 };
@@ -136,9 +137,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Fills the delay lines with the running sums of the gap, and adds the differences that end in it.
     fn bridge(&mut self, gap: &Bridge, bridging: usize) {
-        // Not `ilog2`, as the code for its panic is linked although a gap is never empty.
+        // `ilog2` would link the code of its panic, although a gap is never empty.
         let highest = (u64::BITS - 1).saturating_sub((gap.start ^ gap.end).leading_zeros()) as usize;
-        // From the coarsest line on, as each takes its sums from finer ones.
+        // The coarsest line is filled first, since each line takes its sums from finer ones.
         for level in (0..=highest.min(Self::LEVELS - 1)).rev() {
             let (last, newest) = (gap.start >> level, gap.end >> level);
             let Some(entered) = newest.checked_sub(OVERLAP as u64) else { continue };

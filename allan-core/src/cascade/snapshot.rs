@@ -46,7 +46,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Snapshot<OCTAVES, OVERLAP> {
         &self.sums
     }
 
-    /// [`Cascade::curve`] at the time of the snapshot, to the bit.
+    /// [`Cascade::curve`] at the time of the snapshot, bit for bit; `sample_period` is in seconds.
     #[must_use]
     pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
         let mut curve = Curve::empty();
@@ -56,7 +56,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Snapshot<OCTAVES, OVERLAP> {
         curve
     }
 
-    /// [`Cascade::curve_without_confidence`] at the time of the snapshot, to the bit.
+    /// [`Cascade::curve_without_confidence`] at the time of the snapshot, bit for bit; `sample_period` is in seconds.
     #[must_use]
     pub fn curve_without_confidence(&self, sample_period: f64) -> Curve<OCTAVES> {
         let mut curve = Curve::empty();
@@ -80,7 +80,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         snapshot
     }
 
-    /// As [`snapshot`](Self::snapshot), in place.
+    /// Copies the sums into `snapshot`, without a second copy on the stack.
     ///
     /// # Cost
     /// | `Cascade::snapshot_into` | Cortex-M4F | Cortex-M0+ |

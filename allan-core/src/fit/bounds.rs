@@ -92,7 +92,7 @@ fn largest<T: TermSet>(points: &Points, problem: &Problem<T>, term: usize) -> f3
         // χ²/edf has a skewness of √(8/edf) and a deviation of √(2/edf).
         let smallest = 1.0 + sqrtf(2.0 / point.edf) * T::gamma_quantile(sqrtf(8.0 / point.edf), false);
         let bound = 1.0 / (smallest * problem.columns[term][at]);
-        // A point without the term, or with too few degrees of freedom for a quantile, excludes nothing.
+        // A point excludes no amount if it lacks the term or has too few degrees of freedom for a quantile.
         if bound < largest {
             largest = bound;
         }
@@ -106,7 +106,7 @@ struct Scatter {
     skewness: f32,
     /// The unconstrained step of the parameter from its estimate: negative only for an amount at its limit of 0.
     pull: f32,
-    /// Change of all parameters, up to a factor, when this one is moved and the others are fitted again.
+    /// Change of all parameters, up to a factor, when this one changes and the others are fitted again.
     direction: [f32; MAX_PARAMETERS],
 }
 
@@ -239,7 +239,8 @@ mod tests {
     use crate::Curve;
     use crate::term::{AllTerms, NoiseTerm};
 
-    /// χ² quantiles 9.591 and 74.22 (Abramowitz and Stegun, table 26.8); a random walk of K = 1 has (2n² + 1)/6n.
+    /// Expected bounds use the χ² quantiles 9.591 and 74.22 (Abramowitz and Stegun, table 26.8); a random walk of K = 1
+    /// has the Allan variance (2n² + 1)/6n.
     #[test]
     fn no_amount_is_larger_than_the_upper_bound_of_a_point() {
         let curve = Curve::<4>::from_points(1.0, 1000, 4, &[(1, 1.0), (2, 0.5)]).expect("a curve");

@@ -30,7 +30,7 @@ pub(crate) fn non_negative<F: Real, const N: usize, const TRIANGLE: usize>(
         Some(set) => free = set,
         None => (*x, free) = ([F::ZERO; N], 0),
     }
-    // No set recurs, except by rounding: hence the limit.
+    // A set can recur only by rounding; the limit ends such a loop.
     for _ in 0..4 * N {
         let along = |i: usize| (0..count).map(|j| a[entry(i, j)] * x[j]).sum::<F>();
         let gradient = |i: usize| (b[i] - along(i)) / a[entry(i, i)].sqrt();
@@ -159,7 +159,7 @@ mod tests {
             let start: [f64; N] = core::array::from_fn(|_| uniform().max(0.0) * 10.0);
             let mut x = start;
             non_negative(&a, &b, N, &mut x);
-            // In another unit, by a power of two whose root is one, no digit is another.
+            // The unit changes by a power of two that is a square, so every digit stays the same.
             let (mut same, unit) = (start, 2.0_f64.powi(-60));
             non_negative(&a.map(|entry| entry * unit), &b.map(|entry| entry * unit), N, &mut same);
             assert_eq!(same, x, "case {case}");

@@ -40,7 +40,7 @@ pub(super) struct Points<'a> {
 }
 
 impl<'a> Points<'a> {
-    /// To be filled in place: too large to be moved over a small stack.
+    /// An empty list, to be filled in place: it is too large to be moved over a small stack.
     #[inline(always)]
     pub(super) const fn empty(curve: CurveView<'a>) -> Self {
         Self { curve, measured: Vec::new(), flicker: FlickerCorrelations::EMPTY }
@@ -48,7 +48,7 @@ impl<'a> Points<'a> {
 
     /// Sets the points to those of the curve, with the degrees of freedom that the curve gives.
     pub(super) fn fill<T: TermSet>(&mut self) {
-        // More points than a cascade has octaves: those between octaves are left out.
+        // If there are more points than a cascade has octaves, those between octaves are left out.
         let all = self.curve.points().len() <= MAX_POINTS;
         let is_used = |point: &AllanPoint| point.avar > 0.0 && (all || point.n.is_power_of_two());
         let last = self.curve.points().iter().rfind(|point| is_used(point));
@@ -123,7 +123,7 @@ pub(super) struct Problem<T> {
 }
 
 impl<T: TermSet> Problem<T> {
-    /// To be filled in place: too large to be moved over a small stack.
+    /// An empty problem, to be filled in place: it is too large to be moved over a small stack.
     #[inline(always)]
     pub(super) const fn empty() -> Self {
         Self {

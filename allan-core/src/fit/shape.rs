@@ -12,7 +12,7 @@ const ROUNDS: usize = 12;
 const FIRST_STEP: f64 = 0.18;
 /// Step, relative to the parameter, below which it counts as converged.
 const LAST_STEP: f64 = 2e-4;
-/// Sum of the rises of the deviance on both sides up to which it is taken for a parabola.
+/// Sum of the rises of the deviance on both sides below which its shape counts as a parabola.
 const NEAR: f32 = 2.0;
 /// Smallest decrease of the deviance in a round that makes another one worthwhile.
 const WORTHWHILE: f32 = 0.01;
@@ -44,7 +44,7 @@ pub(super) fn search<T: TermSet>(
     keep_on: &mut dyn FnMut() -> bool,
 ) -> f32 {
     let mut deviance = problem.minimise(points);
-    // Before any shape changes, as known lines are recognised by their frequency.
+    // Known lines are recognised by their frequency, so this precedes any change of shape.
     let mut is_free = [false; MAX_TERMS];
     is_free.iter_mut().zip(&problem.kinds).for_each(|(is_free, kind)| *is_free = free.has::<T>(kind));
     let mut steps = [[FIRST_STEP; MAX_SHAPE]; MAX_TERMS];
@@ -178,7 +178,7 @@ impl<T: TermSet> Problem<T> {
             let (known, rest) = self.columns.split_at_mut(column);
             let Some(direction) = rest.first_mut() else { break };
             direction.iter_mut().zip(&scale).for_each(|(entry, scale)| *entry *= scale);
-            // Before, so that one threshold holds for all remainders.
+            // The direction is normalised first, so that one threshold holds for all remainders.
             if !normalise(direction, 0.0) {
                 continue;
             }
@@ -238,7 +238,7 @@ mod tests {
         points
     }
 
-    /// From a sixth and from six times the true time constant.
+    /// The search starts at a sixth and at six times the true time constant.
     #[test]
     fn the_search_ends_at_the_time_constant_of_the_curve() {
         let curve = curve(20.0);
@@ -256,7 +256,7 @@ mod tests {
             };
             let deviance = search(&points, &mut problem, FreeShapes::AllExcept(&[]), &mut count);
             let NoiseTerm::Markov(Markov { time_constant }) = problem.kinds[1] else { panic!("{:?}", problem.kinds) };
-            // The deviance rises by 1 a standard deviation from the minimum, which 131,072 samples know to a percent or so.
+            // One standard deviation of the time constant, about 1 % with 131,072 samples, raises the deviance by 1.
             assert!((time_constant / 20.0 - 1.0).abs() < 2e-3, "{start}: {time_constant}");
             assert!(deviance < 0.1 && begun > 100.0, "{begun} {deviance}");
             assert_eq!(deviance, problem.deviance(&points));
@@ -277,7 +277,7 @@ mod tests {
         }
     }
 
-    /// Against the sums over all pairs of samples; one of the three terms is absent.
+    /// The reference sums over all pairs of samples. One of the three terms is absent.
     #[test]
     fn the_derivatives_are_those_of_the_variance_to_the_amounts_and_to_the_free_shapes_of_present_terms() {
         let curve = curve(8.0);

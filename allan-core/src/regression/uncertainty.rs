@@ -20,7 +20,7 @@ pub(super) struct OctaveWeight {
 const WELL_KNOWN: f64 = 30.0;
 /// Number of shortest octaves that are tested: a filter or a line gives them a form that N, B and K cannot fit.
 const SHORT: usize = 6;
-/// Residual of one of them, in standard deviations, that marks a poor model.
+/// Residual of one of these octaves, in standard deviations, that marks a poor model.
 const MISFIT: f64 = 6.0;
 
 /// True if `model`, fitted to the curve, does not describe its shortest octaves, which dominate the fit.
@@ -32,7 +32,8 @@ pub(super) fn is_poor(model: &Model, points: &[AllanPoint]) -> bool {
 }
 
 impl OctaveWeight {
-    /// For a point of the residual's curve and the model fitted to that curve; `None` if both variances are 0.
+    /// The weight of a point of the residual's curve, by the model fitted to that curve; `None` if both variances are
+    /// 0.
     pub(super) fn new(point: &AllanPoint, model: &Model, is_poor: bool) -> Option<Self> {
         let edf = model.edf(point);
         // Variance that the model does not explain is noise of the regression too.
@@ -99,13 +100,13 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// A known sensitivity.
+    /// A sensitivity that is known without error.
     #[must_use]
     pub fn exact(covariate: usize, value: f64) -> Self {
         Self { covariate, value, error: 0.0, degrees_of_freedom: f64::INFINITY }
     }
 
-    /// A sensitivity with a standard deviation that was estimated with so many degrees of freedom.
+    /// A sensitivity with this standard deviation, which was estimated with these degrees of freedom.
     pub(super) fn new(covariate: usize, value: f64, deviation: f64, degrees_of_freedom: f64) -> Self {
         let widening = student(NORMAL_975, degrees_of_freedom) / NORMAL_975;
         Self { covariate, value, error: deviation * widening, degrees_of_freedom }
@@ -118,7 +119,8 @@ impl Sensitivity {
         (self.value - half_width, self.value + half_width)
     }
 
-    /// Significance: normal standard deviations exceeded as rarely as this distance from 0 by Student's t.
+    /// Significance: the normal deviate with the same probability as this distance from 0 by Student's t (D. Wallace, Ann.
+    /// Math. Statist. 30, 1959).
     #[must_use]
     pub fn sigmas(&self) -> f64 {
         let widening = student(NORMAL_975, self.degrees_of_freedom) / NORMAL_975;
@@ -131,8 +133,8 @@ impl Sensitivity {
     }
 }
 
-/// The value that Student's t exceeds as rarely as a normal deviate exceeds `normal` (Wallace, Ann. Math. Statist. 30,
-/// 1959): within 1.2 % for 3 or more degrees of freedom.
+/// The quantile of Student's t with the tail probability of the normal deviate `normal` (Wallace, Ann. Math. Statist.
+/// 30, 1959), within 1.2 % for 3 or more degrees of freedom.
 fn student(normal: f64, degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom.is_infinite() {
         return normal;

@@ -1,8 +1,8 @@
 //! Processes with an exponentially decaying autocovariance: Gauss–Markov, and the resonance with its complex decay
 //! rate.
 //!
-//! With `r_j = Re z^j`, `z = exp(−λ)`, the variance of a sum of `m` samples is `Re[m(1+z)/(1−z) − 2z(1−z^m)/(1−z)²]`,
-//! written in `1 − z`, or in powers of `λ` where that cancels.
+//! The variance of a sum of `m` samples is `Re[m(1+z)/(1−z) − 2z(1−z^m)/(1−z)²]` with the autocovariance
+//! `r_j = Re z^j`, `z = exp(−λ)`. It is written in `1 − z`, or in powers of `λ` where that cancels.
 
 use super::process::Process;
 use crate::math::{cos, exp, expm1, sin};
@@ -152,7 +152,7 @@ fn squared_covariance_tail(rate: Complex, n: f64, stride: f64) -> f64 {
     squared_tail(covariance_at_2n(rate, n), rate * stride)
 }
 
-/// As [`squared_covariance_tail`], of covariances with these values at a lag of `2n` and the rate `step` per stride.
+/// [`squared_covariance_tail`] from the covariance `at_2n` at a lag of `2n`, which decays by `exp(−step)` per stride.
 pub(super) fn squared_tail(at_2n: Complex, step: Complex) -> f64 {
     let first = at_2n - at_2n * step.one_minus_exp();
     let steady = first.square() / -expm1(-2.0 * step.re);

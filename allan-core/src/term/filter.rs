@@ -67,7 +67,8 @@ impl MovingAverageFilter {
         f64::from(self.taps) / self.decimation * sample_period * sqrt(f64::from(self.stages) / 2.0)
     }
 
-    /// Power gain at `frequency` in Hz for what passes the filter.
+    /// Power gain, 0 to 1, at `frequency` in Hz: `(sin(L·x)/(L·sin x))²` per stage, with `x = π·f·sample_period/decimation`
+    /// and `L` taps. `sample_period` is that of the samples that are read, s.
     #[must_use]
     pub fn gain(&self, frequency: f64, sample_period: f64) -> f64 {
         let half = PI * frequency * sample_period / self.decimation;
@@ -126,8 +127,8 @@ impl MovingAverageFilter {
         })
     }
 
-    /// Allan variance at averaging factor `n` of noise that has passed the filter, by the `sum_variance` of what comes
-    /// to it and the autocorrelation of the impulse response.
+    /// Allan variance at averaging factor `n` of noise behind the filter, from the `sum_variance` of the noise before
+    /// it and the autocorrelation of the impulse response.
     ///
     /// For a filter that is read slowly, `sum_variance` must be lower by a twelfth of its second difference (Euler and
     /// Maclaurin); a thirtieth is missing at `n = 1` and a decimation by the number of taps. `sum_variance` may bend
@@ -163,7 +164,7 @@ impl MovingAverageFilter {
     }
 }
 
-/// The numbers of samples that the entries of a table at strides of `stride` samples are of, with these.
+/// Each entry of a table with its number of samples, in strides of `stride` samples.
 fn sums(stride: f64, table: &mut [f64]) -> impl Iterator<Item = (f64, &mut f64)> {
     table.iter_mut().enumerate().map(move |(at, entry)| (at as f64 * stride, entry))
 }

@@ -36,7 +36,7 @@ impl LowPass {
         Self { frequency, damping: 0.999 }
     }
 
-    /// Frequency at which half of the power is left, Hz.
+    /// Frequency at which half of the power is left, Hz: `f₀·√(1 − 2ζ² + √((1 − 2ζ²)² + 1))`.
     #[must_use]
     pub fn bandwidth(&self) -> f64 {
         let excess = 1.0 - 2.0 * self.damping * self.damping;

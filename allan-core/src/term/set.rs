@@ -117,7 +117,7 @@ impl TermSet for PowerLawTerms {
         }
     }
 
-    /// In units of the stride, and for the random walk without the term to which second differences are blind.
+    /// The table is in units of the stride. A random walk lacks the term to which second differences are blind.
     fn sum_variances(kind: &NoiseTerm, _: u64, _: u32, _: f64, table: &mut [f32]) {
         for (k, entry) in (0_u16..).map(f32::from).zip(table) {
             *entry = match kind {
@@ -148,10 +148,11 @@ impl TermSet for PowerLawTerms {
         0..0
     }
 
-    /// By E. Wilson and M. Hilferty (Abramowitz and Stegun, Handbook of Mathematical Functions, 26.4.17).
+    /// The approximation of E. Wilson and M. Hilferty (Abramowitz and Stegun, Handbook of Mathematical Functions,
+    /// 26.4.17).
     fn gamma_quantile(skewness: f32, upper: bool) -> f32 {
         let normal = if upper { NORMAL_975 as f32 } else { -NORMAL_975 as f32 };
-        // With 8/skewness² degrees of freedom, of which the approximation uses 2/9.
+        // The degrees of freedom `ν` are 8/skewness², and the approximation uses 2/(9ν).
         let ninth = skewness * skewness / 36.0;
         let cube = (1.0 - ninth + normal * sqrtf(ninth)).max(0.0);
         (cube * cube * cube - 1.0) * 2.0 / skewness

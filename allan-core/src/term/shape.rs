@@ -2,42 +2,42 @@
 
 pub(crate) const MAX_SHAPE: usize = 2;
 
-/// The shape parameters of a term: their values, or what `T` says of each.
+/// The shape parameters of a term: their values, or a `T` for each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Shape<T = f64> {
-    /// A power law has none.
+    /// A power law has no shape parameters.
     PowerLaw,
-    /// For [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
+    /// Parameters of [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
     Filtered {
-        /// Taps of each of its averages.
+        /// Number of values that each moving average averages.
         taps: T,
-        /// Values of the filter for each sample.
+        /// Filter values per sample.
         decimation: T,
     },
-    /// For [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
+    /// Parameter of [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
     Markov {
-        /// s
+        /// Correlation time, s.
         time_constant: T,
     },
-    /// For [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
+    /// Parameters of [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
     Resonance {
-        /// Hz
+        /// Centre frequency, Hz.
         frequency: T,
-        /// Hz
+        /// Full width at half height, Hz.
         bandwidth: T,
     },
-    /// For [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
+    /// Parameter of [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
     Sinusoid {
-        /// Hz
+        /// Frequency, Hz.
         frequency: T,
     },
-    /// For [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
+    /// Parameters of [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
     LowPass {
-        /// Hz
+        /// Natural frequency, Hz.
         frequency: T,
-        /// 1
+        /// Damping ratio.
         damping: T,
     },
 }

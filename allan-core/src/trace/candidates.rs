@@ -11,9 +11,9 @@ const MAX_SHAPES: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LineCandidates<'a> {
-    /// From the curve itself, in which only strong lines show.
+    /// Lines are sought in the curve itself, which shows only strong ones.
     Curve,
-    /// Only these terms, which were found in a spectrum.
+    /// The candidates are only these terms, which were found in a spectrum.
     Spectrum(&'a [NoiseTerm]),
 }
 

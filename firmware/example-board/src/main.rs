@@ -1,6 +1,6 @@
-//! Example of a custom board, outside of the package `firmware`: an RP2040 wired as a Raspberry Pi Pico, whose GP21 is connected to RST of
-//! the sensor, so that the recovery resets the sensor by its pin. It is built and run by the system tests; take it as a template. A board with
-//! other pins starts them itself, as [`wires::start`] does.
+//! Example of a custom board, outside of the package `firmware`. It is an RP2040 wired as a Raspberry Pi Pico, whose GP21 is connected to
+//! RST of the sensor, so that the recovery can reset the sensor by its pin. The system tests build and run it; take it as a template. A
+//! board with other pins starts them itself, as [`wires::start`] does.
 #![no_std]
 #![no_main]
 

@@ -1,11 +1,11 @@
-//! What an image writes to flash, from its ELF.
+//! The bytes that an image writes to flash, from its ELF.
 
 use object::Endianness::Little;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader, ProgramHeader};
 use std::ops::Range;
 
-/// Why an image was not converted.
+/// The reason for which an image was not converted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -29,7 +29,7 @@ pub enum ImageError {
 /// The loadable segments of an ELF image that lie in `flash`, in the order of their addresses; at least one.
 ///
 /// # Errors
-/// The file is no complete ELF, nothing in it is for the flash, or its segments overlap or do not fit there.
+/// The file is no complete ELF, it has nothing for the flash, or its segments overlap or do not fit there.
 pub fn segments(elf: &[u8], flash: Range<u32>) -> Result<Vec<(u32, &[u8])>, ImageError> {
     let header = FileHeader32::<object::Endianness>::parse(elf)?;
     let endian = header.endian()?;
@@ -47,7 +47,7 @@ pub fn segments(elf: &[u8], flash: Range<u32>) -> Result<Vec<(u32, &[u8])>, Imag
             segments.push((address, bytes));
         }
     }
-    // Before a byte is copied: so many headers may name the same bytes of a small file that copying them would take minutes.
+    // This check precedes any copy: the headers of a small file can name the same bytes so often that copying takes minutes.
     segments.sort_by_key(|(address, _)| *address);
     for pair in segments.windows(2) {
         if let [(first, bytes), (second, _)] = pair
@@ -62,8 +62,7 @@ pub fn segments(elf: &[u8], flash: Range<u32>) -> Result<Vec<(u32, &[u8])>, Imag
 /// Addresses of the flash of an STM32F405xG (RM0090 section 3.4).
 const STM32F405: Range<u32> = 0x0800_0000..0x0810_0000;
 
-/// The bytes of an image for an STM32F405 from the beginning of its flash, with 0xFF, as erased flash has it, where nothing is
-/// loaded.
+/// The bytes of an image for an STM32F405 from the beginning of its flash. Bytes that no segment fills are 0xFF, as in erased flash.
 ///
 /// # Errors
 /// Those of [`segments`].

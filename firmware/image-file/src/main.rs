@@ -17,7 +17,7 @@ struct Board {
     target: &'static str,
     extension: &'static str,
     convert: fn(&[u8]) -> Result<Vec<u8>, ImageError>,
-    /// How to load the file, whose name takes the place of `FILE`.
+    /// Instructions to load the file; its name replaces `FILE`.
     load: &'static str,
 }
 
@@ -46,7 +46,7 @@ a board that runs this firmware shows the drive after the command bootsel",
         convert: flash_contents::stm32f405,
         load: DFU,
     },
-    // With a serial port on USB, which has not run yet.
+    // This image has a serial port on USB, which has not run yet.
     Board {
         name: "feather-usb",
         program: "observatory-feather",
@@ -96,10 +96,10 @@ fn run(arguments: &[String]) -> Result<(), Box<dyn Error>> {
 /// Builds the image and returns its ELF.
 fn build(board: &Board) -> Result<Vec<u8>, Box<dyn Error>> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    // As in the tests: cargo, which runs this program, may hold the lock of its own folder.
+    // A separate folder, as in the tests: cargo, which runs this program, may hold the lock of its own.
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from).join("image");
     fs::create_dir_all(&target).map_err(|error| format!("{}: {error}", target.display()))?;
-    // Cargo writes the images of a board into one file, whatever their features: the tests build others at the same time.
+    // Cargo writes the images of a board into one file for all features, and the tests may build others at the same time.
     let one_at_a_time = fs::File::create(target.join("building"))?;
     one_at_a_time.lock()?;
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))

@@ -20,9 +20,9 @@ const RP2040: u32 = 0xE48B_FF56;
 /// Addresses at which the RP2040 maps its flash: 16 MiB at most.
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
-/// Converts those loadable segments of an ELF image that lie in flash to the blocks of a UF2 file, in the order of their
-/// addresses. Bytes that no segment fills are zero, up to the ends of the sectors: the boot ROM erases a sector with the first block that it
-/// gets of it, and may program the pages of one with gaps without erasing it (github.com/raspberrypi/pico-sdk, pull request 800).
+/// Converts the loadable segments of an ELF image that lie in flash to the blocks of a UF2 file, in the order of their addresses. Bytes
+/// that no segment fills are zero, up to the ends of the sectors: the boot ROM erases a sector with its first block, and may program pages
+/// of a sector with gaps without erasing it (github.com/raspberrypi/pico-sdk, pull request 800).
 ///
 /// # Errors
 /// Those of [`segments`].
@@ -79,7 +79,7 @@ mod tests {
         elf
     }
 
-    /// Offsets and numbers are those of the table in the specification.
+    /// Offsets and numbers are those of the table in the UF2 specification.
     #[test]
     fn the_blocks_follow_the_specification() {
         let bytes: Vec<u8> = (0..300_u32).map(|k| k as u8).collect();
@@ -97,7 +97,8 @@ mod tests {
         assert!(uf2[1024 + 76..1532].iter().all(|&byte| byte == 0));
     }
 
-    /// Two segments 8 KiB apart: every sector that is touched has all of its pages, and the one between has none.
+    /// The two segments are 8 KiB apart. Each sector that they touch has all of its pages, and the sector between has
+    /// none.
     #[test]
     fn sectors_have_no_gaps() {
         let segments: [(u32, &[u8]); 3] = [(0x1000_0010, &[1; 8]), (0x1000_0F00, &[2; 8]), (0x1000_2100, &[3; 300])];
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_for_the_pico_is_refused() {
+    fn a_file_that_is_no_image_for_the_pico_is_refused() {
         assert!(matches!(from_elf(b"MZ"), Err(ImageError::Elf(_))));
         assert_eq!(from_elf(&elf(0x0800_0000, &[1])), Err(ImageError::NoFlash(0x1000_0000)));
         let whole = elf(0x1000_0000, &[1, 2, 3]);

@@ -1,10 +1,10 @@
-//! The command, run as a person runs it: what it writes is read back by the definition of each format.
+//! Runs the command as a user does, and decodes the files that it writes by the definitions of their formats.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-/// Runs the command for a board and returns what it has written and said.
+/// Runs the command for a board and returns the file and the output.
 fn run(board: &str, file: &Path) -> (Vec<u8>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_image-file")).arg(board).arg(file).output().expect("it starts");
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -25,7 +25,7 @@ fn pages(uf2: &[u8]) -> BTreeMap<u32, &[u8]> {
         let [magic0, magic1, flags, address, size, block_number, blocks, family] =
             [0, 4, 8, 12, 16, 20, 24, 28].map(|at| word(block, at));
         assert_eq!((magic0, magic1, word(block, 508)), (0x0A32_4655, 0x9E5D_5157, 0x0AB1_6F30), "block {number}");
-        // The boot ROM takes blocks of its family and of 256 bytes alone (RP2040 data sheet, section 2.8.4.2).
+        // The boot ROM takes only blocks of its family and of 256 bytes (RP2040 data sheet, section 2.8.4.2).
         assert_eq!((flags, size, family), (0x2000, 256, 0xE48B_FF56), "block {number}");
         assert_eq!((block_number as usize, blocks as usize), (number, count));
         assert_eq!(address % 256, 0);
@@ -42,11 +42,11 @@ fn the_pico_boots_what_is_written() {
     let pages = pages(&uf2);
     let addresses: Vec<u32> = pages.keys().copied().collect();
     assert!(addresses.windows(2).all(|pair| pair[1] == pair[0] + 256), "no page is missing between the others");
-    // The boot ROM runs the second stage, the first 256 bytes, only if its last word is the CRC of the others (data sheet,
-    // section 2.8.1.3.1: polynomial 0x04c11db7, begun with ones, neither reflected nor inverted).
+    // The boot ROM runs the second stage, the first 256 bytes, only if its last word is the CRC of the others (data sheet, section
+    // 2.8.1.3.1: polynomial 0x04c11db7, initial value of all ones, neither reflected nor inverted).
     let stage = pages[&0x1000_0000];
     assert_eq!(crc::Crc::<u32>::new(&crc::CRC_32_MPEG_2).checksum(&stage[..252]), word(stage, 252));
-    // The second stage starts the vector table behind it: the stack ends in RAM, and the program begins in flash, in Thumb code.
+    // The vector table follows the second stage: the stack ends in RAM, and the program begins in flash, in Thumb code.
     let vectors = pages[&0x1000_0100];
     assert!((0x2000_0000..=0x2004_2000).contains(&word(vectors, 0)), "{:#x}", word(vectors, 0));
     assert!(pages.contains_key(&(word(vectors, 4) & !0xFF)) && word(vectors, 4) & 1 == 1, "{:#x}", word(vectors, 4));
@@ -57,7 +57,7 @@ fn the_feather_boots_what_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let (contents, said) = run("feather", &folder.path().join("observatory.bin"));
     assert!(said.contains("dfu-util --alt 0 --dfuse-address 0x08000000:leave --download"), "{said}");
-    // The processor loads stack pointer and program counter from the beginning of flash (RM0090 section 2.4). The stack ends with
+    // The processor loads stack pointer and program counter from the beginning of flash (RM0090 section 2.4). The stack ends at the end of
     // the core-coupled memory.
     assert_eq!(word(&contents, 0), 0x1001_0000);
     let reset = word(&contents, 4);

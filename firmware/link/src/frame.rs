@@ -104,7 +104,7 @@ impl Flavor for CobsFlavor<'_> {
     }
 }
 
-/// What a [`Decoder`] has received and discarded.
+/// Counts of the items that a [`Decoder`] has received and discarded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct DecoderCounters {
     /// Valid messages.
@@ -129,7 +129,7 @@ pub enum Received {
     Message {
         /// Sequence number, counted modulo 2¹⁶ by the sender.
         sequence: u16,
-        /// Its content.
+        /// Content of the message.
         message: Message,
     },
     /// A text line.
@@ -230,7 +230,7 @@ impl Decoder {
     }
 }
 
-/// Why the bytes between two zero bytes are no message.
+/// The reason for which the bytes between two zero bytes are not a message.
 enum FrameError {
     OtherVersion,
     Damaged,

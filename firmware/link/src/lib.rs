@@ -2,8 +2,8 @@
 //!
 //! **Frames.** A frame carries one [`Message`]: format version (`u8`), sequence number (`u16`) and message, serialised by
 //! postcard, then the CRC-32 (ISO-HDLC, little endian) of these bytes. The whole is COBS-encoded, so that it contains no
-//! zero byte, and enclosed in a zero byte at either end. The leading zero byte terminates noise or text that precedes the
-//! frame: the receiver discards that, and not the frame.
+//! zero byte, and enclosed in a zero byte at either end. The leading zero byte terminates noise or text before the frame, so that the
+//! receiver discards that and not the frame.
 //!
 //! **Text lines.** Between frames there may be lines of plain text for a terminal program: printable ASCII that ends in CR
 //! LF, also enclosed in zero bytes.

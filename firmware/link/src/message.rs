@@ -1,6 +1,6 @@
 //! Messages from the firmware to the host.
 //!
-//! The order of variants and fields is the wire format: both are only ever appended to, and their names do not matter.
+//! The order of variants and fields is the wire format. New ones are only appended; names do not matter.
 
 use crate::text::MAX_TEXT;
 use heapless::{String, Vec};
@@ -31,15 +31,15 @@ pub enum Message {
     Health(Health),
     /// One line of text.
     Log(String<MAX_TEXT>),
-    /// Bursts as read from the sensor, while the raw stream is on.
+    /// Bursts as read from the sensor; sent while the raw stream is on.
     Raw(RawMessage),
-    /// Errors, on the finished epoch, of the model that a channel had learned from the epoch before.
+    /// Errors of a channel's model from the epoch before on the finished epoch.
     Validation(ValidationMessage),
-    /// The model that a channel has learned from the finished epoch, for validation on the next one.
+    /// The model that a channel has learned from the finished epoch; it is validated on the next one.
     Learned(LearnedMessage),
 }
 
-/// One message to be sent, by reference: the device has no memory for a copy. Variants as in [`Message`].
+/// One message to be sent, by reference: the device has no memory for a copy. Variants are those of [`Message`].
 #[derive(Debug, Clone, Copy, Serialize)]
 #[allow(missing_docs, reason = "documented at `Message`")]
 pub enum MessageRef<'a> {
@@ -79,14 +79,14 @@ pub struct Hello {
     pub filter_taps_log2: u8,
     /// Programmed sample rate in Hz.
     pub sample_rate_hz: f64,
-    /// Sample rate in Hz, measured with the microcontroller's clock, with which this report is made; `None`, and the report made
-    /// with the programmed one, before 64 samples.
+    /// Sample rate in Hz, measured with the microcontroller's clock and used in this report. `None` before 64 samples: the report then uses
+    /// the programmed rate.
     pub measured_rate_hz: Option<f64>,
     /// Serial clock of the sensor's bus as set in the hardware, in Hz.
     pub spi_clock_hz: u32,
     /// Time since the application started, in microseconds.
     pub uptime_us: u64,
-    /// Whether the sensor answers and is being sampled.
+    /// True if the sensor answers and is being sampled.
     pub sampling: bool,
     /// Number of epochs finished before this one.
     pub epoch: u32,
@@ -96,7 +96,7 @@ pub struct Hello {
     pub boot: Boot,
 }
 
-/// What a microcontroller's clocks are derived from.
+/// Source of a microcontroller's clocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ClockSource {
     /// The crystal of the board: within some 50 ppm.
@@ -109,7 +109,7 @@ pub enum ClockSource {
 /// How the application was started.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Boot {
-    /// Why the microcontroller started.
+    /// Reason for which the microcontroller started.
     pub cause: BootCause,
     /// Starts since power-on, this one included, as counted in retained RAM.
     pub starts: u32,
@@ -117,15 +117,15 @@ pub struct Boot {
     pub restored_channels: u8,
     /// Text of the panic or fault that ended the previous run; empty if there was none.
     pub crash_record: String<MAX_TEXT>,
-    /// What the microcontroller's clocks, and with them all times and rates of the report, are derived from.
+    /// Source of the microcontroller's clocks, on which all times and rates of the report depend.
     pub clock: ClockSource,
-    /// The start follows the third crash within ten minutes: nothing that was stored is used. Appended to version 4: false of a device
+    /// True if this start follows the third crash within ten minutes: no stored data are used. Appended to version 4; false for a device
     /// that does not send it.
     #[serde(deserialize_with = "default_if_absent")]
     pub safe_mode: bool,
 }
 
-/// Why the microcontroller started.
+/// Reason for which the microcontroller started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BootCause {
     /// The reset flags name no cause.
@@ -135,11 +135,11 @@ pub enum BootCause {
     PowerOn,
     /// The supply fell below the brown-out threshold.
     BrownOut,
-    /// The reset pin.
+    /// The reset pin was low.
     Pin,
-    /// The firmware itself: a command, or a panic.
+    /// The firmware restarted itself, by a command or after a panic.
     Software,
-    /// The watchdog.
+    /// The watchdog expired.
     Watchdog,
 }
 
@@ -148,9 +148,9 @@ pub enum BootCause {
 pub struct ChannelMessage {
     /// Position of the channel in the burst, 1 for gyro X.
     pub channel: u8,
-    /// Samples that the estimator has taken.
+    /// Samples taken.
     pub samples: u64,
-    /// Samples missing between them, for whatever reason. Time goes on through them.
+    /// Samples missing between them, for any reason. Time goes on through them.
     pub missing: u64,
     /// Sums of every octave, by rising averaging factor.
     pub octaves: Vec<ReportedOctave, MAX_OCTAVES>,
@@ -158,14 +158,15 @@ pub struct ChannelMessage {
     pub coefficients: Vec<ReportedCoefficient, MAX_COEFFICIENTS>,
     /// Error of the previous epoch's model on this epoch's curve; `None` without a previous model or a curve.
     pub unseen_error: Option<ReportedModelError>,
-    /// Missing samples that never arrived: edges that did not come, failed transfers, bursts dropped because the queue was
-    /// full. Counted since the epoch began or the device started.
+    /// Missing samples that never arrived: lost edges, failed transfers, bursts dropped because the queue was full. Counted since the epoch
+    /// began or the device started.
     pub lost: u64,
-    /// Missing samples that arrived and were refused in this channel, counted likewise. [`Health`] has the causes.
+    /// Missing samples that arrived and were refused in this channel, counted over the same time. [`Health`] has the
+    /// causes.
     pub refused: u64,
     /// Missing samples that the curve replaces: those in gaps that its longer octaves bridge.
     pub replaced: u64,
-    /// Whether the channel has failed its last self-test, which also happens in motion. Its samples are used.
+    /// True if the channel failed its last self-test. Its samples are used: motion also fails the test.
     pub self_test_failed: bool,
 }
 
@@ -230,7 +231,7 @@ pub struct ReportedCoefficient {
     pub high: f64,
 }
 
-/// What a channel has learned from a finished epoch.
+/// The model that a channel has learned from a finished epoch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LearnedMessage {
     /// Position of the channel in the burst.
@@ -267,15 +268,15 @@ pub struct ReportedRegressor {
 pub struct ReportedAddedTerm {
     /// Its coefficient.
     pub coefficient: ReportedCoefficient,
-    /// Parameters of its shape, as listed at [`ReportedTerm`]; empty for terms without a shape.
+    /// Parameters of the term's shape, as listed at [`ReportedTerm`]; empty for terms without a shape.
     pub shape: Vec<ReportedParameter, 2>,
     /// Decrease of the deviance: the square of a number of standard deviations.
     pub score: f64,
     /// Averaging factor with the largest residual of the model without the term.
     pub n: u64,
-    /// Measured over modelled deviation there, less 1.
+    /// Measured over modelled deviation at `n`, less 1.
     pub excess: f64,
-    /// The same in standard deviations.
+    /// The residual at `n` in standard deviations.
     pub sigmas: f64,
 }
 
@@ -314,9 +315,9 @@ pub struct ValidationMessage {
 /// Change of a stream's mean from one epoch to the next, in the channel's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReportedShift {
-    /// Of the stream as sampled.
+    /// Change of the mean as sampled.
     pub raw: f64,
-    /// Of the compensated stream.
+    /// Change of the mean of the compensated stream.
     pub compensated: f64,
 }
 
@@ -325,9 +326,9 @@ pub struct ReportedShift {
 pub struct ReportedDeviations {
     /// Averaging factor in samples.
     pub n: u64,
-    /// Of the stream as sampled.
+    /// Allan deviation as sampled.
     pub raw: f64,
-    /// Of the compensated stream.
+    /// Allan deviation of the compensated stream.
     pub compensated: f64,
 }
 
@@ -339,7 +340,7 @@ pub struct RawMessage {
     pub first: u64,
     /// Time of the first burst's data-ready edge, in microseconds since the application started.
     pub at_us: u64,
-    /// Register SENS_AVG (gyro range and filter) during all of them.
+    /// Register SENS_AVG (gyro range and filter) during all of these bursts.
     pub sens_avg: u16,
     /// The bursts.
     pub bursts: Vec<RawBurst, MAX_RAW_BURSTS>,
@@ -359,15 +360,15 @@ pub struct RawBurst {
 /// A counter or figure of [`Health`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counter {
-    /// The name of its field.
+    /// The name of the field in [`Health`].
     pub name: &'static str,
-    /// Its value.
+    /// The value.
     pub value: u32,
-    /// It counts events, and stands still while all is well. The others count samples, or are figures of the load.
+    /// True if it counts events, and so does not rise without faults. Others count samples, or are load figures.
     pub counts_events: bool,
 }
 
-/// Makes [`Health`] and all that goes through its fields of a list of them.
+/// Defines [`Health`] and everything that enumerates its fields from one list.
 macro_rules! health {
     ($($(#[$attribute:meta])* $kind:ident $name:ident,)*) => {
         /// Counters since the application started or the statistics were reset, and load figures. Counters saturate.
@@ -380,7 +381,7 @@ macro_rules! health {
             /// Number of counters and figures.
             pub const COUNTERS: usize = [$(stringify!($name)),*].len();
 
-            /// All of them, in the order of the message.
+            /// All counters and figures, in the order of the message.
             #[must_use]
             pub fn counters(&self) -> [Counter; Self::COUNTERS] {
                 [$(Counter { name: stringify!($name), value: self.$name, counts_events: health!($kind) }),*]
@@ -394,7 +395,7 @@ macro_rules! health {
                 }
             }
 
-            /// The sums of all counters, of which each is counted in one place: the others have 0.
+            /// Adds two sets of counters, saturating. Each counter is counted in one of them: the other has 0.
             #[must_use]
             pub fn with(&self, others: &Self) -> Self {
                 Self { $($name: self.$name.saturating_add(others.$name)),* }
@@ -443,7 +444,7 @@ health! {
     event spurious_edges,
     /// Bursts not used because the sensor was suspect and had not been probed yet.
     event suspect,
-    /// Times that the sensor was lost after it had delivered samples.
+    /// Losses of the sensor after it had delivered samples.
     event recoveries,
     /// Raw messages dropped because the transmit queue was full.
     event raw_dropped,
@@ -469,21 +470,21 @@ health! {
     event implausible_supply,
     /// Reads of DIAG_STAT because the error bit was set, at most one a second.
     event diag_reads,
-    /// Of these, reads with bit 0: supply below 4.75 V.
+    /// Reads of DIAG_STAT with bit 0: supply below 4.75 V.
     event diag_supply_low,
-    /// With bit 1: supply above 5.25 V.
+    /// Reads of DIAG_STAT with bit 1: supply above 5.25 V.
     event diag_supply_high,
-    /// With bit 2: a flash update failed.
+    /// Reads of DIAG_STAT with bit 2: a flash update failed.
     event diag_flash_update,
-    /// With bit 3: a frame had a wrong number of clocks.
+    /// Reads of DIAG_STAT with bit 3: a frame had a wrong number of clocks.
     event diag_spi,
-    /// With bit 4: a sensor was beyond its range.
+    /// Reads of DIAG_STAT with bit 4: a sensor was beyond its range.
     event diag_over_range,
-    /// With bit 5 or one of bits 10 to 15: a self-test failed.
+    /// Reads of DIAG_STAT with bit 5 or one of bits 10 to 15: a self-test failed.
     event diag_self_test,
-    /// With bit 6: the checksum of the flash memory is wrong.
+    /// Reads of DIAG_STAT with bit 6: the checksum of the flash memory is wrong.
     event diag_flash_checksum,
-    /// With bit 8 or 9: an alarm was raised.
+    /// Reads of DIAG_STAT with bit 8 or 9: an alarm was raised.
     event diag_alarm,
     /// Steps of recovery: the registers were read again and set where they differed.
     event rereads,
@@ -493,22 +494,23 @@ health! {
     event sensor_resets,
     /// Steps of recovery: the sensor was reset by its RST line.
     event reset_lines,
-    /// Bursts not used because the sensor's filter still mixed them with what was before a self-test, a reset or a change of
-    /// settings; and 32 after a start or such a change, from which the gate against gross errors learns the noise.
+    /// Bursts not used because the sensor's filter still contained samples from before a self-test, a reset or a change of settings.
+    /// Includes the 32 bursts after a start or such a change from which the gate against gross errors learns the noise.
     event settling,
     /// Times that the data-ready line was masked because it oscillated.
     event data_ready_masked,
-    /// Bursts of which a channel was refused as a gross error: further from the sample before than its noise makes likely.
+    /// Bursts of which a channel was refused as a gross error: its step from the sample before is too large for its noise.
     event gross_errors,
-    /// Messages and text lines that were not copied to the USB port, since the host did not read it.
+    /// Messages and text lines not copied to the USB port because the host did not read it.
     event usb_dropped,
-    /// Bursts refused because the error flag was set in some of their words and clear in others, which no sensor sends. Appended to
-    /// version 4: 0 of a device that does not send it.
+    /// Bursts refused because the error flag was set in some words and clear in others, which no sensor sends. Appended to version 4; 0 for
+    /// a device that does not send it.
     #[serde(deserialize_with = "default_if_absent")]
     event mixed_alarm,
 }
 
-/// A last field that the sender may not know. Nothing else makes it unreadable, since the frame's checksum is right.
+/// Deserialises a last field that the sender may not know. The frame's checksum is right, so a failure means that it is
+/// absent.
 fn default_if_absent<'de, T: Deserialize<'de> + Default, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     Ok(T::deserialize(deserializer).unwrap_or_default())
 }

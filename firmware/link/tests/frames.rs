@@ -78,7 +78,7 @@ fn longest_validation() -> Message {
     })
 }
 
-/// The longest message of what was learned.
+/// The longest message of a learned model.
 fn longest_learned() -> Message {
     let regressor =
         ReportedRegressor { covariate: 10, value: f64::MAX, low: f64::MIN, high: f64::MAX, reference: 25.0 };
@@ -207,7 +207,7 @@ fn an_endless_stream_without_zeros_is_bounded_and_counted() {
     assert_eq!((counters.bad_frames, counters.discarded_bytes), (1, 10 * MAX_FRAME as u64));
 }
 
-/// A frame of version 2 with a right checksum, made by hand.
+/// A frame of version 2 with a right checksum, assembled by hand.
 #[test]
 fn another_version_is_counted_apart_from_damage() {
     let body = [2, 0, 9, 9];
@@ -221,7 +221,7 @@ fn another_version_is_counted_apart_from_damage() {
     assert_eq!(counters, DecoderCounters { other_version: 1, ..DecoderCounters::default() });
 }
 
-/// Right checksum, wrong content: more octaves than a message may have, and a variant that does not exist.
+/// The checksum is right and the content wrong: more octaves than a message may have, or a variant that does not exist.
 #[test]
 fn a_valid_checksum_over_invalid_content_is_a_bad_frame() {
     for body in [&[VERSION, 0, 1, 1, 1, 0, 0xFF][..], &[VERSION, 0, 200][..], &[VERSION][..]] {
@@ -274,7 +274,7 @@ fn a_text_line_is_printable() {
     assert_eq!(line.as_slice(), b"\x000.05 ??/s??\r\n\0");
 }
 
-/// The longest line, a zero byte on either side, and its end: 124 bytes, for which there is just the memory.
+/// The longest line, a zero byte on either side and its end take 124 bytes, which just fit the buffer.
 #[test]
 fn the_longest_text_line_is_sent_whole() {
     let line = "x".repeat(MAX_TEXT);

@@ -1,16 +1,16 @@
-//! Bytes that firmware of each version of the wire format sent are kept here, with what they say. A change after which they are decoded
-//! otherwise needs another version: devices in use send them. What may come is tested too: fields at the end of a message, and messages,
-//! that the receiver does not know.
+//! Byte streams from firmware of each version of the wire format, with their contents. If a change decodes them differently, the format
+//! needs a new version, since devices in use send them. Also tested: messages, and fields at the end of a message, that the receiver does
+//! not know.
 
 use link::{Decoder, DecoderCounters, Encoder, Message, Received};
 
 /// One message of each kind, numbered from 0.
 const VERSION_4: &[u8] = include_bytes!("kept_stream/version-4-safe-mode.bin");
 const VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4-safe-mode.txt");
-/// The same before `Boot` had its last field, `safe_mode`, which is false.
+/// The stream of [`VERSION_4`] before `Boot` had its last field, `safe_mode`, which is false.
 const SECOND_VERSION_4: &[u8] = include_bytes!("kept_stream/version-4-mixed-alarm.bin");
 const SECOND_VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4-mixed-alarm.txt");
-/// The same before `Health` had its last field, `mixed_alarm`, which is 0.
+/// The stream of [`VERSION_4`] before `Health` had its last field, `mixed_alarm`, which is 0.
 const FIRST_VERSION_4: &[u8] = include_bytes!("kept_stream/version-4.bin");
 const FIRST_VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4.txt");
 
@@ -46,7 +46,7 @@ fn frame(body: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn the_kept_streams_say_what_they_said() {
+fn the_kept_streams_decode_to_the_kept_messages() {
     for (stream, said) in [
         (VERSION_4, VERSION_4_MESSAGES),
         (SECOND_VERSION_4, SECOND_VERSION_4_MESSAGES),
@@ -79,7 +79,7 @@ fn fields_that_a_later_build_appends_are_left_out() {
 
 #[test]
 fn a_message_that_a_later_build_adds_loses_no_other() {
-    // Kinds 0 to 6 are known; each is followed by one of kind 7.
+    // The receiver knows kinds 0 to 6; a message of kind 7 follows each.
     let frames = bodies(VERSION_4).into_iter().flat_map(|body| {
         let unknown = [&[body[0], body[1], 7][..], &[9; 40]].concat();
         [frame(&body), frame(&unknown)].concat()

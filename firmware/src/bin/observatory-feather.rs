@@ -8,7 +8,7 @@
 //! | TX, RX | PB10, PB11 | USART3, 460 800 Bd 8N1 | to the host |
 //! | USB | PA11, PA12 | with the feature `feather-usb`, which has not run yet: serial port (CDC-ACM) | to the host |
 //!
-//! SCK, MO and MI of the board are SPI2 and not used; USB gives the 5 V.
+//! SCK, MO and MI of the board are SPI2 and not used; USB supplies the 5 V.
 //!
 //! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider or a level
 //! shifter (data sheet Rev. B, page 5).

@@ -1,4 +1,4 @@
-//! The [`Board`] that the main loop has, over what it shares with the interrupts.
+//! The [`Board`] of the main loop, over the resources that it shares with the interrupts.
 
 use super::processor::{ESTIMATOR_CYCLES, LOST_BYTES, SAMPLING_CYCLES, stack};
 use super::sensor_spi::BurstEnd;
@@ -20,14 +20,14 @@ use heapless::spsc::Producer;
 use link::Health;
 use rtic::Mutex;
 
-/// Before the first frame after a burst, µs: the stall of low-power mode.
+/// Pause between a burst and the first frame after it, µs: the stall of low-power mode.
 const STALL_US: u32 = 75;
-/// RST low, µs, as with the driver of Linux; the data sheet has no minimum.
+/// Time for which RST is low, µs, as in the Linux driver; the data sheet gives no minimum.
 const RESET_US: u32 = 100;
-/// Abandons a burst, µs; the longest takes 1.5 ms (164 kHz, gaps of 16 µs).
+/// Time after which a burst is abandoned, µs; the longest takes 1.5 ms (164 kHz, gaps of 16 µs).
 const BURST_US: u32 = 5_000;
 
-/// Shared with the two interrupts of sampling.
+/// The resources shared with the two interrupts of sampling.
 pub struct SharedSampling<B: BoardSupport> {
     uptime: Uptime,
     bus: BusOf<B>,
@@ -36,7 +36,7 @@ pub struct SharedSampling<B: BoardSupport> {
 }
 
 impl<B: BoardSupport> SharedSampling<B> {
-    /// Bursts go to `queue`.
+    /// Sampling that queues its bursts in `queue`.
     pub fn new(bus: BusOf<B>, line: B::DataReady, queue: Producer<'static, TimedBurst>) -> Self {
         let uptime = Uptime::new(B::Microcontroller::counter());
         Self { uptime, bus, sampler: Sampler::new(queue), line }
@@ -46,7 +46,7 @@ impl<B: BoardSupport> SharedSampling<B> {
         self.uptime.at(B::Microcontroller::counter())
     }
 
-    /// A new sample: starts the transfer of a burst by DMA.
+    /// Handles a data-ready edge: starts the transfer of a burst by DMA.
     pub fn data_ready(&mut self) {
         self.line.clear();
         let now_us = self.now_us();
@@ -57,7 +57,7 @@ impl<B: BoardSupport> SharedSampling<B> {
         }
     }
 
-    /// The end of the transfer: queues the burst.
+    /// Handles the end of the transfer: queues the burst.
     pub fn transfer_ended(&mut self) {
         match self.bus.end_burst() {
             BurstEnd::MoreWords => {}
@@ -67,11 +67,11 @@ impl<B: BoardSupport> SharedSampling<B> {
     }
 }
 
-/// Shared with the interrupt of the estimators.
+/// The resources shared with the interrupt of the estimators.
 pub struct SharedEstimation {
     /// The estimators.
     pub estimators: Estimators<'static>,
-    /// To the serial ports.
+    /// The queues to the serial ports.
     pub transmit_queue: TransmitQueue<'static>,
 }
 
@@ -88,8 +88,8 @@ pub struct BoardContext<'r, B: BoardSupport, S, E> {
 }
 
 impl<'r, B: BoardSupport, S, E> BoardContext<'r, B, S, E> {
-    /// `received` has the bytes from the serial ports, whose interrupts `request_transmission` requests; `abandon_burst`
-    /// requests that of the end of a burst, which fails if it is still being transferred.
+    /// `received` has the bytes from the serial ports. `request_transmission` requests their interrupts. `abandon_burst` requests the
+    /// interrupt of the end of a burst, which fails if it is still being transferred.
     pub fn new(
         (sampling, estimation): (S, E),
         reset_line: &'r mut Option<OutputOf<B>>,
@@ -255,7 +255,7 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
     }
 }
 
-/// Locked for one transaction at a time.
+/// The bus, locked for one transaction at a time.
 pub struct LockedBus<'a, S>(&'a mut S);
 
 impl<S> ErrorType for LockedBus<'_, S> {

@@ -6,7 +6,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::ExceptionFrame;
 use link::{Boot, BootCause, ClockSource};
 
-// Not initialised at the start.
+// These statics are not initialised at the start.
 
 #[unsafe(link_section = ".uninit.retained")]
 static RETAINED: RetainedMemory = blank_memory();
@@ -14,7 +14,7 @@ static RETAINED: RetainedMemory = blank_memory();
 #[unsafe(link_section = ".uninit.crash_record")]
 static CRASH_RECORD: CrashRecord = CrashRecord::blank();
 
-/// Start cause with crash record, and retained RAM, erased after power-on.
+/// Returns the cause of the start with the crash record, and the retained RAM, which is erased after power-on.
 pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
     let mut retained = RetainedRam::open(&RETAINED);
     if cause == BootCause::PowerOn {
@@ -37,14 +37,14 @@ pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
 /// Writes the place and the message of a panic into the crash record.
 pub fn record_panic(info: &PanicInfo<'_>) {
     let (path, line) = info.location().map_or(("?", 0), |at| (at.file(), at.line()));
-    // Paths of dependencies are too long.
+    // The paths of dependencies are too long for the record.
     let file = path.rsplit('/').next().unwrap_or(path);
     CRASH_RECORD.write(format_args!("panic at {file}:{line}: {}", info.message()));
-    // The message is in the crash record.
+    // The crash record contains the message.
     defmt::error!("panic at {=str}:{=u32}", path, line);
 }
 
-/// No frame after a stack overflow.
+/// Writes a fault into the crash record. There is no frame after a stack overflow.
 pub fn record_fault(frame: Option<&ExceptionFrame>) {
     match frame {
         Some(frame) => {
@@ -195,7 +195,7 @@ macro_rules! observatory {
             fn wake(context: wake::Context) {
                 context.local.blinker.tick();
                 Mcu::extend_watchdog(context.local.extension);
-                // A stalled port raises no interrupt.
+                // A stalled port raises no interrupt, so its interrupt is requested here.
                 $(rtic::pend(Interrupt::$usb_interrupt);)?
             }
         }
@@ -206,7 +206,7 @@ macro_rules! observatory {
             <<$board as $crate::microcontroller::BoardSupport>::Microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
 
-        /// Passes on the exception frame; none after a stack overflow, with the stack pointer reset.
+        /// Passes on the exception frame; after a stack overflow it resets the stack pointer and passes none.
         #[unsafe(naked)]
         #[unsafe(export_name = "HardFault")]
         unsafe extern "C" fn hard_fault() -> ! {

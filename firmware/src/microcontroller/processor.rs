@@ -7,17 +7,17 @@ use cortex_m::peripheral::syst::SystClkSource;
 use embedded_hal::digital::OutputPin;
 use link::ClockSource;
 
-/// Longest sampling interrupt in cycles; written by the sampling interrupts only.
+/// Longest sampling interrupt in cycles; only the sampling interrupts write it.
 pub static SAMPLING_CYCLES: AtomicU32 = AtomicU32::new(0);
-/// Longest run of the estimators in cycles; written by their interrupt only.
+/// Longest run of the estimators in cycles; only their interrupt writes it.
 pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
-/// Per port; written by its interrupt only.
+/// Lost bytes of each port; only the port's interrupt writes its count.
 pub(super) static LOST_BYTES: [AtomicU32; HostPort::COUNT] = [const { AtomicU32::new(0) }; HostPort::COUNT];
 
-/// SysTick interrupts a second, which wake the main loop; fits 24 bits at 168 MHz.
+/// SysTick interrupts a second, which wake the main loop; the reload value fits 24 bits at 168 MHz.
 pub const WAKE_HZ: u32 = 16;
 
-/// Runs `work`, shorter than a period of SysTick, and keeps the largest number of cycles in `longest`.
+/// Runs `work`, which must be shorter than a period of SysTick, and keeps the largest number of cycles in `longest`.
 pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     let start = SYST::get_current();
     work();
@@ -34,7 +34,7 @@ pub fn count_lost_bytes(port: HostPort, lost: u32) {
     all.store(all.load(Relaxed).saturating_add(lost), Relaxed);
 }
 
-/// Blinks once a second by the crystal, eight times by the internal oscillator.
+/// Blinks the LED: once a second with the crystal, eight times with the internal oscillator.
 pub struct Blinker<L> {
     led: L,
     half_period: u32,
@@ -42,7 +42,7 @@ pub struct Blinker<L> {
 }
 
 impl<L: OutputPin> Blinker<L> {
-    /// Either level may be the bright one.
+    /// A blinker of `led`; either level may be the bright one.
     pub fn new(led: L, clock: ClockSource) -> Self {
         let half_period = match clock {
             ClockSource::Crystal => WAKE_HZ / 2,
@@ -59,7 +59,7 @@ impl<L: OutputPin> Blinker<L> {
     }
 }
 
-/// Starts SysTick, of which there are [`WAKE_HZ`] interrupts a second.
+/// Starts SysTick with [`WAKE_HZ`] interrupts a second.
 pub fn start_systick(mut systick: SYST, core_hz: u32) {
     systick.set_clock_source(SystClkSource::Core);
     systick.set_reload(core_hz / WAKE_HZ - 1);
@@ -68,13 +68,13 @@ pub fn start_systick(mut systick: SYST, core_hz: u32) {
     systick.enable_counter();
 }
 
-/// Largest depth and size of the stack in bytes, by the last word of the start-up pattern.
+/// Largest depth and size of the stack in bytes. The depth ends at the last word of the start-up pattern.
 pub(super) fn stack() -> (u32, u32) {
     unsafe extern "C" {
         static _stack_start: u32;
         static _stack_end: u32;
     }
-    /// By cortex-m-rt's paint-stack.
+    /// The pattern of cortex-m-rt's `paint-stack`.
     const PAINT: u32 = 0xCCCC_CCCC;
     let (start, end) = (&raw const _stack_start as usize, &raw const _stack_end as usize);
     // SAFETY: the stack lies between these linker symbols and is readable RAM.

@@ -1,4 +1,4 @@
-//! The sensor's bus: registers by byte, bursts by DMA, times of chip select.
+//! The sensor's bus: register frames byte by byte, bursts by DMA, the timing of chip select.
 
 use crate::board::{BusTiming, FrameTimes};
 use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, MicrosecondCounter, transfer, wait_ns};
@@ -13,13 +13,13 @@ static REQUEST: [u8; BURST_BYTES] = BURST_REQUEST;
 
 /// An SPI peripheral with the two DMA channels that serve it.
 pub trait SpiPeripheral: ByteExchange {
-    /// Times the bus.
+    /// The counter that times the bus.
     type Clock: MicrosecondCounter;
     /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
     /// Resets the peripheral and keeps its settings.
     fn reset(&mut self);
-    /// Waits for a byte and drops received ones, which would shift the next burst.
+    /// Waits for the current byte and drops received ones, which would shift the next burst.
     fn drain(&mut self);
     /// Starts a transfer of `request`, with an interrupt at its end. Both slices must outlive it, and nothing may use
     /// `received` before it is [stopped](Self::stop).
@@ -28,9 +28,9 @@ pub trait SpiPeripheral: ByteExchange {
     fn stop(&mut self) -> bool;
 }
 
-/// How a transfer has ended.
+/// The end of a transfer.
 pub enum BurstEnd<'a> {
-    /// A word was transferred, and the next one has been started.
+    /// A word was transferred, and the next one was started.
     MoreWords,
     /// The sensor is deselected; these bytes were received.
     Complete(&'a [u8; BURST_BYTES]),
@@ -43,12 +43,12 @@ pub struct SensorSpi<P, S> {
     peripheral: P,
     select: ChipSelect<S>,
     received: &'static mut [u8; BURST_BYTES],
-    /// For the burst, including those under way.
+    /// Bytes of the burst whose transfer was started.
     started: usize,
 }
 
 impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
-    /// `select` must be high; once.
+    /// The bus of a sensor whose `select` is high. It may be made only once.
     pub fn new(peripheral: P, select: S) -> Self {
         let received = cortex_m::singleton!(: [u8; BURST_BYTES] = [0; BURST_BYTES]).expect("the bus is created once");
         Self { peripheral, select: ChipSelect::new(select, BusTiming::USUAL), received, started: 0 }
@@ -73,12 +73,12 @@ impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
         self.peripheral.set_clock_limit(limit_hz)
     }
 
-    /// Keeps other times from the next frame on.
+    /// Sets other bus times from the next frame on.
     pub fn set_timing(&mut self, timing: BusTiming) {
         self.select.timing = timing;
     }
 
-    /// The times of the frames since they were taken last.
+    /// The times of the frames since the last call.
     pub fn take_frame_times(&mut self) -> FrameTimes {
         self.select.take_times()
     }
@@ -89,14 +89,14 @@ impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
         self.peripheral.reset();
     }
 
-    /// Selects the sensor and starts a burst; an interrupt follows at its end, or at that of a part.
+    /// Selects the sensor and starts a burst. An interrupt follows at its end, or at the end of a word.
     pub fn start_burst(&mut self) {
         self.select.select::<P::Clock>();
         self.started = 0;
         self.start_bytes();
     }
 
-    /// To be called in that interrupt.
+    /// Handles that interrupt.
     pub fn end_burst(&mut self) -> BurstEnd<'_> {
         let complete = self.peripheral.stop();
         compiler_fence(Ordering::SeqCst);

@@ -8,7 +8,7 @@ use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorF
 /// Failure of a flash operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlashError {
-    /// The bytes are not of the memory of the settings, or not whole units.
+    /// The bytes are outside of the memory for the settings, or not whole units.
     OutOfBounds,
     /// The flash does not take the operation.
     Refused,
@@ -23,11 +23,11 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// The flash memory of a microcontroller, which it reads as memory.
+/// The flash memory of a microcontroller, which reads it as memory.
 pub trait FlashMemory {
-    /// Address of its first byte.
+    /// Address of the first byte.
     const ORIGIN: usize;
-    /// Bytes that are erased at once, at offsets that are multiples of them.
+    /// Number of bytes that are erased at once; a sector's offset is a multiple of it.
     const SECTOR: usize;
     /// Erases the sector at `offset`.
     ///
@@ -42,7 +42,7 @@ pub trait FlashMemory {
 }
 
 unsafe extern "C" {
-    // By the memory map.
+    // The memory map sets these symbols.
     static _settings_start: u8;
     static _settings_end: u8;
 }
@@ -61,7 +61,7 @@ impl<M: FlashMemory> SettingsFlash<M> {
         (start as usize - M::ORIGIN) as u32..(end as usize - M::ORIGIN) as u32
     }
 
-    /// Whole units within the settings.
+    /// Checks that a range is in whole units and within the settings.
     fn check(offset: u32, length: usize, unit: usize) -> Result<(), FlashError> {
         let (begin, end, settings) = (offset as usize, (offset as usize).saturating_add(length), Self::range());
         let is_inside = begin >= settings.start as usize && end <= settings.end as usize;

@@ -10,7 +10,7 @@ const ENDPOINTS: usize = 8;
 
 #[derive(Default)]
 struct Wires {
-    /// Endpoints that were allocated beside endpoint 0, out and in.
+    /// Number of endpoints allocated beside endpoint 0, out and in.
     allocated: [usize; 2],
     /// Packets that the device has written and the host has not read.
     to_host: [Option<Vec<u8>>; ENDPOINTS],
@@ -33,12 +33,12 @@ impl MockBus {
         self.0.lock().unwrap()
     }
 
-    /// Resets the bus, as a host does to a device that was plugged in. Packets under way are gone.
+    /// Resets the bus, as a host does with a newly plugged device. Packets under way are lost.
     pub(crate) fn reset_bus(&self) {
         self.wires().events.push_back(PollResult::Reset);
     }
 
-    /// No frame starts: the host sleeps, or the device was unplugged.
+    /// Suspends the bus: no frame starts, since the host sleeps or the device was unplugged.
     pub(crate) fn suspend_bus(&self) {
         self.wires().events.push_back(PollResult::Suspend);
     }
@@ -60,8 +60,8 @@ impl MockBus {
         packet
     }
 
-    /// A control transfer with the data of a host, if it has any; `serve` runs the device. Returns the data of the device, or
-    /// `None` if it refuses the request.
+    /// Makes a control transfer with the host's data, if any; `serve` runs the device. Returns the device's data, or `None` if it refuses
+    /// the request.
     pub(crate) fn control(&self, setup: [u8; 8], data: &[u8], mut serve: impl FnMut()) -> Option<Vec<u8>> {
         let length = usize::from(u16::from_le_bytes([setup[6], setup[7]]));
         {
@@ -88,7 +88,7 @@ impl MockBus {
             }
         }
         if setup[0] & 0x80 != 0 {
-            self.send(0, &[]); // the status
+            self.send(0, &[]); // status stage
             serve();
         }
         Some(answer)

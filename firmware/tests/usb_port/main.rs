@@ -1,4 +1,4 @@
-//! The USB port on a bus without wires: what the emulator of the Pico cannot show, such as line coding, suspending and
+//! The USB port on a simulated bus. These tests cover what the Pico's emulator cannot show: line coding, suspending,
 //! unplugging, and a host that does not read for an hour.
 
 mod host;
@@ -21,11 +21,11 @@ const SET_CONFIGURATION: [u8; 8] = [0x00, 9, 1, 0, 0, 0, 0, 0];
 const GET_DEVICE: [u8; 8] = [0x80, 6, 0, 1, 0, 0, 18, 0];
 const SET_LINE_CODING: [u8; 8] = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
 const GET_LINE_CODING: [u8; 8] = [0xA1, 0x21, 0, 0, 0, 0, 7, 0];
-/// DTR, and RTS: a terminal opens the port.
+/// DTR and RTS are set: a terminal opens the port.
 const OPEN: [u8; 8] = [0x21, 0x22, 3, 0, 0, 0, 0, 0];
 const CLOSE: [u8; 8] = [0x21, 0x22, 0, 0, 0, 0, 0, 0];
 
-/// The endpoints that carry the bytes: behind that of the notifications, by order of allocation.
+/// The endpoints that carry the bytes. They follow the endpoint of the notifications in the order of allocation.
 const DATA_IN: usize = 2;
 const DATA_OUT: usize = 1;
 
@@ -40,7 +40,7 @@ struct Bench {
 }
 
 thread_local! {
-    /// What the port has asked of its controller, in order: to go off the bus (false), or to start again.
+    /// Requests of the port to its controller, in order: off the bus (false), or start again (true).
     static RECONNECTED: RefCell<Vec<bool>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -93,7 +93,7 @@ impl Bench {
         assert_eq!(self.control(OPEN, &[]), Some(vec![]));
     }
 
-    /// Sends a text, which the UART has sent on return.
+    /// Sends a text; the UART has sent it on return.
     fn print(&mut self, text: &str) -> Vec<u8> {
         assert!(self.queue.send_text(&text_line(format_args!("{text}"))), "the UART has room");
         self.serve();
@@ -104,7 +104,7 @@ impl Bench {
         std::iter::from_fn(|| self.uart.dequeue()).collect()
     }
 
-    /// What the host reads, until the device has nothing more.
+    /// Reads as the host until the device has no more bytes.
     fn read(&mut self) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some(packet) = self.bus.read(DATA_IN) {
@@ -138,14 +138,14 @@ fn the_host_finds_a_serial_port_with_a_name_and_a_number() {
     let mut bench = Bench::new();
     bench.enumerate();
     let device = bench.control(GET_DEVICE, &[]).expect("the descriptor");
-    // USB 2.0, table 9-8, and the class of communication devices.
+    // The expected values are from USB 2.0, table 9-8, and the class of communication devices.
     assert_eq!((device[0], device[1], device[4]), (18, 1, 2));
     assert_eq!(device[8..12], [0x8A, 0x2E, 0x0A, 0x00]);
     let strings = [14, 15, 16].map(|field| bench.string(device[field]));
     assert_eq!(strings, [MANUFACTURER, PRODUCT, SERIAL_NUMBER]);
 }
 
-/// The baud rate has no meaning on USB; a terminal that sets it must get it back.
+/// The baud rate has no meaning on USB, but a terminal that sets it must read it back.
 #[test]
 fn any_line_coding_is_taken() {
     let mut bench = Bench::new();
@@ -166,7 +166,7 @@ fn usb_has_the_bytes_of_the_uart_and_takes_commands() {
     bench.enumerate();
     bench.open();
     let (mut uart, mut usb) = (Vec::new(), Vec::new());
-    // Packets of all lengths up to the longest, a full one at the end among them.
+    // Packets have all lengths up to the longest, and a full one comes last.
     for length in 1..=120 {
         uart.extend(bench.print(&"x".repeat(length)));
         usb.extend(bench.read());
@@ -181,8 +181,8 @@ fn usb_has_the_bytes_of_the_uart_and_takes_commands() {
     assert_eq!(typed, b"f 819.2\r");
 }
 
-/// More is typed than the receive queue holds: what is lost is counted, and the packets do not stay in the endpoint, whose
-/// interrupt would not end.
+/// The input is longer than the receive queue. Lost bytes are counted, and the packets do not stay in the endpoint, whose interrupt would
+/// not end.
 #[test]
 fn too_much_input_is_counted() {
     let mut bench = Bench::new();
@@ -193,10 +193,10 @@ fn too_much_input_is_counted() {
     assert_eq!(std::iter::from_fn(|| bench.received.dequeue()).count(), 255);
 }
 
-/// Nobody reads while 36,000 lines are printed; then a terminal reads on. It has the lines that the
-/// queue held, whole, and what is sent from then on; the others are counted.
+/// No host reads while 36,000 lines are printed; then a terminal reads. It gets the lines that the queue held, whole,
+/// and all later ones. The others are counted.
 #[test]
-fn a_host_that_does_not_read_costs_what_it_does_not_read() {
+fn a_host_that_does_not_read_loses_only_the_lines_of_that_time() {
     let mut bench = Bench::new();
     bench.enumerate();
     bench.open();
@@ -211,7 +211,7 @@ fn a_host_that_does_not_read_costs_what_it_does_not_read() {
     assert_eq!(bench.read(), sent);
 }
 
-/// A cable without a host, or a charger: nothing is kept, and nothing counts as lost.
+/// With a cable without a host, or a charger, no byte is queued and none counts as lost.
 #[test]
 fn without_a_host_nothing_waits() {
     let mut bench = Bench::new();
@@ -223,7 +223,7 @@ fn without_a_host_nothing_waits() {
     assert_eq!(bench.read(), sent);
 }
 
-/// What was printed while the port was closed is not told to the terminal that opens it.
+/// A terminal that opens the port does not get what was printed while the port was closed.
 #[test]
 fn a_terminal_begins_with_what_comes_after_it() {
     let mut bench = Bench::new();
@@ -239,9 +239,9 @@ fn a_terminal_begins_with_what_comes_after_it() {
     assert_eq!(bench.read(), sent);
 }
 
-/// The host sleeps and wakes: the device goes on where it was, and what it had no room for is counted.
+/// The host sleeps and wakes. The device continues where it was, and counts the bytes for which it had no room.
 #[test]
-fn a_suspended_bus_is_survived() {
+fn a_suspended_bus_gets_nothing_and_the_kept_lines_after_it_has_resumed() {
     let mut bench = Bench::new();
     bench.enumerate();
     bench.open();
@@ -260,16 +260,18 @@ fn a_suspended_bus_is_survived() {
     assert_eq!(bench.read(), sent);
 }
 
-/// Unplugged at any byte of a line and plugged in again, a hundred times: the device is found again, and begins with whole lines.
+/// The cable is unplugged at any byte of a line and plugged in again, a hundred times. The host finds the device again, and reads whole
+/// lines.
 #[test]
-fn unplugging_is_survived() {
+fn the_port_works_each_time_that_it_is_plugged_in_again() {
     let mut bench = Bench::new();
     for attempt in 0..100 {
         bench.enumerate();
         bench.open();
         let sent = bench.print(&format!("plugged in {attempt} times"));
         assert_eq!(bench.read(), sent, "attempt {attempt}");
-        // Some packets are read before the cable is pulled; the device, which the sensor's supply may feed, goes on.
+        // The host reads some packets before the cable is pulled. The device goes on, since the sensor's supply may
+        // feed it.
         bench.print(&"y".repeat(attempt));
         bench.print(&"z".repeat(110));
         (0..attempt % 4).for_each(|_| drop(bench.bus.read(DATA_IN)));
@@ -280,8 +282,8 @@ fn unplugging_is_survived() {
     }
 }
 
-/// The controller takes no packet any more, though the host has the port open: after half a minute it is reset and stays off the bus until
-/// the host has noticed; then it is found again and carries what is sent.
+/// The controller takes no more packets although the host has the port open. After half a minute it is reset, and stays off the bus until
+/// the host has noticed. Then the host finds it again, and it carries bytes.
 #[test]
 fn a_controller_that_hangs_is_reset() {
     let mut bench = Bench::new();
@@ -308,7 +310,7 @@ fn a_controller_that_hangs_is_reset() {
     assert_eq!(reconnected(), [false, true], "nothing waits");
 }
 
-/// A port that nobody has opened, a suspended bus, and one without a host do not stall.
+/// A port that no terminal has opened, a suspended bus and a bus without a host do not count as stalled.
 #[test]
 fn a_port_without_a_reader_is_left_alone() {
     let mut bench = Bench::new();

@@ -1,4 +1,4 @@
-//! Benchmarks of the noise analysis on recordings whose true noise, or what is hidden in it, is known.
+//! Benchmarks of the noise analysis on recordings with known noise or known hidden effects.
 
 pub mod contradictions;
 pub mod filtered_noise;

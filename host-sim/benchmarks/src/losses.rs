@@ -1,8 +1,8 @@
-//! Benchmark of lost samples: records complete and with losses, compared in curve and model.
+//! Benchmark of lost samples: curve and model of complete records and of records with losses.
 //!
 //! ```text
 //! seed ─► noise ─► complete record ─► Cascade ─► curve, N, B, K ─┐
-//!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► ratios, degrees of freedom, intervals ─► table
+//!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► ratios, degrees of freedom, intervals ─► JSON ─► tables.py
 //! ```
 
 mod estimate;
@@ -18,7 +18,7 @@ pub use table::{CoefficientComparison, LossComparison, LossTable, OctaveRatio};
 use crate::parallel;
 use std::convert::Infallible;
 
-/// How many records to simulate.
+/// The records to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LossPlan {
     pub records: u64,
@@ -44,10 +44,10 @@ impl LossPlan {
                 comparisons.push(LossComparison::new(of_noise[0].0, pattern, &pairs));
             }
         }
-        LossTable { records: self.records, samples: self.samples, comparisons }
+        LossTable { records: self.records, rate_hz: RATE_HZ, samples: self.samples, comparisons }
     }
 
-    /// The record of a seed, complete and with each loss.
+    /// The record of a seed, complete and with each pattern of losses.
     fn record(&self, noise: TestNoise, seed: u64) -> Vec<EstimatedRecord> {
         let record = noise.record(self.samples, seed);
         let losses = LossPattern::ALL.into_iter().map(|pattern| pattern.gaps(self.samples, seed));

@@ -1,4 +1,4 @@
-//! The program `benchmarks`: runs a benchmark, prints its tables, writes them as JSON.
+//! The program `benchmarks`: runs a benchmark and writes its result as JSON, of which `tables.py` makes tables.
 
 use anyhow::{Context, Result};
 use benchmarks::contradictions::ContradictionPlan;
@@ -12,12 +12,12 @@ use clap::{Args, Parser, Subcommand, value_parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fs::OpenOptions;
-use std::io::{self, BufWriter, StdoutLock, Write};
+use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Most recordings of a benchmark: each has a seed of its own, and its result is kept until the end.
+/// Most recordings of a benchmark. Each has its own seed, and its result is kept until the end.
 const MOST_RECORDINGS: u64 = 100_000;
 
 /// Benchmarks of the noise analysis, on recordings whose noise or whose effects are known.
@@ -26,9 +26,9 @@ const MOST_RECORDINGS: u64 = 100_000;
 struct Cli {
     #[command(subcommand)]
     benchmark: Benchmark,
-    /// Write the result as JSON; - for standard output.
-    #[arg(long, global = true, value_name = "OUT")]
-    json: Option<PathBuf>,
+    /// Where the result goes as JSON, of which tables.py makes tables [default: standard output].
+    #[arg(short, long, global = true, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -198,29 +198,30 @@ fn in_filter(text: &str) -> Result<usize, String> {
     }
 }
 
-/// The number of threads, by default that of the cores, and 1 where the machine does not say how many it has.
+/// The number of threads. The default is the number of cores, or 1 if the machine does not report it.
 fn threads(jobs: Option<NonZeroUsize>) -> usize {
     jobs.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get)
 }
 
-/// Exit code 0 for success, 1 for an error; the argument parser ends the process with 2 for wrong usage.
+/// Runs the program. The exit code is 0 for success and 1 for an error; the argument parser exits with 2 for wrong
+/// usage.
 fn main() -> ExitCode {
     match run(Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        // Closed by its reader, as `head` does.
+        // The reader of standard output may close it, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // If standard error is closed too, the exit code remains.
+            // If standard error is closed too, only the exit code shows the error.
             let _ = writeln!(io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }
     }
 }
 
-fn run(Cli { benchmark, json }: Cli) -> Result<()> {
-    let json = json.as_deref();
-    if let Some(file) = json.filter(|file| !is_standard_output(file)) {
-        // Before hours of work; keeps the content of a file.
+fn run(Cli { benchmark, output }: Cli) -> Result<()> {
+    let output = output.as_deref();
+    if let Some(file) = output {
+        // The file is opened before hours of work; its content is kept.
         OpenOptions::new().append(true).create(true).open(file).with_context(|| file.display().to_string())?;
     }
     let bar = ProgressBar::new(0);
@@ -248,7 +249,7 @@ fn run(Cli { benchmark, json }: Cli) -> Result<()> {
             };
             let table = plan.run(progress)?;
             bar.finish_and_clear();
-            conclude(&table, json, |out| table.write(out))
+            write("undeclared", &table, output)
         }
         Benchmark::Measured(arguments) => {
             let MeasuredArguments { recordings, rate, stretches, seconds, samples, strength, seed, jobs } = arguments;
@@ -258,55 +259,49 @@ fn run(Cli { benchmark, json }: Cli) -> Result<()> {
             let plan = MeasuredNoisePlan { recordings, stretches, length, strength, seed, jobs: threads(jobs) };
             let table = plan.run(progress);
             bar.finish_and_clear();
-            conclude(&table, json, |out| table.write(out))
+            write("measured", &table, output)
         }
         Benchmark::Contradictions(ContradictionArguments { records, seconds, seed, jobs }) => {
             let plan = ContradictionPlan { records, seconds, first_seed: seed, jobs: threads(jobs) };
             let table = plan.run(progress)?;
             bar.finish_and_clear();
-            conclude(&table, json, |out| table.write(out))
+            write("contradictions", &table, output)
         }
         Benchmark::Filters(FilterArguments { taps, every, records, seconds, seed, jobs }) => {
             let plan = FilteredNoisePlan { taps, every, records, seconds, first_seed: seed, jobs: threads(jobs) };
             let table = plan.run(progress);
             bar.finish_and_clear();
-            conclude(&table, json, |out| table.write(out))
+            write("filters", &table, output)
         }
         Benchmark::Paper(PaperArguments { seeds, first_seed }) => {
             let result = Reproduction { seeds, first_seed }.run(|done| progress(done as usize, seeds as usize));
             bar.finish_and_clear();
-            conclude(&result, json, |out| result.write(out))
+            write("paper", &result, output)
         }
         Benchmark::Losses(LossArguments { records, samples_log2, first_seed, jobs }) => {
             let plan = LossPlan { records, samples: 1 << samples_log2, first_seed, jobs: threads(jobs) };
             let table = plan.run(progress);
             bar.finish_and_clear();
-            conclude(&table, json, |out| table.write(out))
+            write("losses", &table, output)
         }
     }
 }
 
-fn conclude(
-    result: &impl Serialize,
-    file: Option<&Path>,
-    tables: impl FnOnce(&mut BufWriter<StdoutLock>) -> io::Result<()>,
-) -> Result<()> {
-    let mut out = BufWriter::new(io::stdout().lock());
-    if let Some(file) = file {
-        let mut json = serde_json::to_vec_pretty(result)?;
-        json.push(b'\n');
-        if is_standard_output(file) {
-            out.write_all(&json)?;
-            return Ok(out.flush()?);
-        }
-        std::fs::write(file, json).with_context(|| file.display().to_string())?;
-    }
-    tables(&mut out)?;
-    Ok(out.flush()?)
+/// The JSON that `tables.py` reads: the name of the benchmark and the fields of its result.
+#[derive(Serialize)]
+struct Outcome<'a, T> {
+    benchmark: &'static str,
+    #[serde(flatten)]
+    result: &'a T,
 }
 
-fn is_standard_output(file: &Path) -> bool {
-    file.as_os_str() == "-"
+fn write(benchmark: &'static str, result: &impl Serialize, file: Option<&Path>) -> Result<()> {
+    let mut json = serde_json::to_vec_pretty(&Outcome { benchmark, result })?;
+    json.push(b'\n');
+    match file {
+        Some(file) => std::fs::write(file, json).with_context(|| file.display().to_string()),
+        None => Ok(io::stdout().lock().write_all(&json)?),
+    }
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

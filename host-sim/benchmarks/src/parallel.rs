@@ -1,10 +1,10 @@
-//! Independent recordings on several threads.
+//! Runs independent recordings on several threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Results of `work` in the order of the items; `progress` gets the numbers of finished and of all items. No item
-/// begins after an error.
+/// Results of `work` in the order of the items. `progress` gets the numbers of finished and of all items. No item is
+/// started after an error.
 ///
 /// # Errors
 /// The first one in the order of the items.
@@ -24,7 +24,7 @@ pub(crate) fn map<I: Sync, T: Send, E: Send>(
                     let Some(item) = items.get(at) else { break };
                     let result = work(item);
                     failed.fetch_or(result.is_err(), Ordering::Relaxed);
-                    // Valid after a panic: only `push` changes it.
+                    // The list is valid after a panic, since only `push` changes it.
                     results.lock().unwrap_or_else(PoisonError::into_inner).push((at, result));
                     progress(done.fetch_add(1, Ordering::Relaxed) + 1, items.len());
                 }

@@ -9,10 +9,9 @@
 mod bias_and_scatter;
 mod four_methods;
 mod published_gyro;
-mod text;
 
 pub use bias_and_scatter::{OctaveScatter, RelativeError, Reproduction, ReproductionResult};
 pub use four_methods::{
     Autocorrelation, FourMethods, InnovationTest, MethodCoefficients, SpectrumOctave, allan_weight,
 };
-pub use published_gyro::{INTERVALS, RATE_HZ, SECONDS, SYMBOLS, TRUTH, slope_coefficients};
+pub use published_gyro::{INTERVALS, RATE_HZ, SECONDS, TRUTH, slope_coefficients};

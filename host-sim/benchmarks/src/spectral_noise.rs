@@ -10,7 +10,7 @@ pub(crate) fn flicker_density(b: f64, frequency: f64) -> f64 {
     b * b / (PI * frequency)
 }
 
-/// Noise of the one-sided `density` (Hz) at `rate_hz`, at most half of a periodic record.
+/// Noise of the one-sided `density` (argument in Hz) at `rate_hz`. It is at most half of a periodic record.
 pub(crate) fn gaussian_noise(
     density: impl Fn(f64) -> f64,
     rate_hz: f64,
@@ -20,7 +20,7 @@ pub(crate) fn gaussian_noise(
     let length = 2 * samples.next_power_of_two();
     let transform = fourier::inverse(length);
     let mut spectrum = transform.make_input_vec();
-    // A density S takes the amplitude √(S·Δf/2)/√2 in each part.
+    // A density S gives each quadrature the amplitude √(S·Δf/2)/√2.
     let spacing = rate_hz / length as f64;
     for (k, value) in spectrum.iter_mut().enumerate().skip(1) {
         let amplitude = (density(k as f64 * spacing) * spacing / 4.0).sqrt();
@@ -48,7 +48,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use std::f64::consts::{LN_2, PI};
 
-    /// (2 ln 2/π)·B² at every averaging time (IEEE Std 952). At least 255 pairs in each of 10 records: 3 % (1 σ).
+    /// The Allan variance is (2 ln 2/π)·B² at every averaging time (IEEE Std 952). At least 255 pairs in each of 10
+    /// records give it to 3 % (1 σ).
     #[test]
     fn flicker_noise_has_the_flat_allan_variance_of_the_standard() {
         for factor in [16, 64, 256] {
@@ -69,10 +70,10 @@ mod tests {
     #[test]
     fn white_noise_has_the_variance_of_its_density() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        // 2N² up to 50 Hz: 100 N².
+        // A density of 2N² up to 50 Hz has the variance 100 N².
         let noise = gaussian_noise(|_| 2.0, 100.0, 1 << 16, &mut random);
         let variance = noise.iter().map(|value| value * value).sum::<f64>() / noise.len() as f64;
-        // 4 σ of 65,536 squares.
+        // The tolerance is 4 σ of 65,536 squares.
         assert!((variance / 100.0 - 1.0).abs() < 4.0 * (2.0f64 / 65_536.0).sqrt(), "{variance}");
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! seed ─► draw (noise, environment, effects; sizes from the detection limit) ─► generator ─► analysis ─► report ─┐
-//!           └──────────────────────────── truth ────────────────────────────────────────────────────► score ─► table
+//!           └──────────────────────────── truth ────────────────────────────────────────────────────► score ─► JSON ─► tables.py
 //! ```
 //!
-//! Development uses open seeds; sealed seeds only measure the finished method.
+//! Development uses the open seeds; sealed seeds only measure the finished method.
 
 mod block_covariance;
 mod channel_under_test;
@@ -19,7 +19,6 @@ mod outside;
 mod outside_limit;
 mod sample_loss;
 mod score;
-mod table;
 mod truth;
 
 #[cfg(test)]
@@ -34,13 +33,13 @@ pub use measured::{
 };
 pub use outside::{OutsideEffect, OutsideKind};
 pub use score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
-pub use table::{Proportion, STRONG, ScoreTable};
 
 use crate::parallel;
+use serde::Serialize;
 
 /// Offset of the sealed seeds; earlier ones, 2⁴⁰ … 2⁶², have been used.
 const SEALED: u64 = 1 << 63;
-/// Reserved per group.
+/// Number of seeds reserved for each group.
 pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
 /// Recordings to simulate and score.
@@ -51,7 +50,7 @@ pub struct UndeclaredPlan {
     pub empty: u64,
     pub pairs: u64,
     pub triples: u64,
-    /// Recordings of each kind outside the vocabulary.
+    /// Number of recordings of each kind outside the vocabulary.
     pub outside: u64,
     /// Length of a recording, s.
     pub seconds: f64,
@@ -61,6 +60,12 @@ pub struct UndeclaredPlan {
     pub seed: u64,
     pub sealed: bool,
     pub jobs: usize,
+}
+
+/// The scores of all recordings, in the order of the plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoreTable {
+    pub outcomes: Vec<(RecordingGroup, RecordingScore)>,
 }
 
 impl UndeclaredPlan {
@@ -82,7 +87,7 @@ impl UndeclaredPlan {
     /// Generates and scores every recording; `progress` gets the numbers of finished and of all.
     ///
     /// # Errors
-    /// The error of the first recording, in the order of the plan, that has no timeline.
+    /// The error of the first recording without a time base, in the order of the plan.
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ScoreTable, ScoreError> {
         let work = |&(group, seed): &(RecordingGroup, u64)| {
             let drawn = DrawnRecording::from_group(group, self.seconds, seed);

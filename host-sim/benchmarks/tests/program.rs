@@ -1,5 +1,6 @@
-//! The program `benchmarks`: the limits of its arguments, and where it writes.
+//! The program `benchmarks`: limits of its arguments, and its outputs.
 
+use crate::tables;
 use std::process::{Command, Output};
 
 fn benchmarks(arguments: &[&str]) -> Output {
@@ -7,7 +8,7 @@ fn benchmarks(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn benchmarks_have_limits() {
+fn impossible_arguments_are_refused_and_any_number_of_jobs_is_accepted() {
     for arguments in [
         &["undeclared", "--nothing", "18446744073709551615"][..],
         &["undeclared", "--nothing", "1000000000"],
@@ -28,7 +29,7 @@ fn benchmarks_have_limits() {
         let output = benchmarks(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
-    // Too short may be the answer.
+    // The result may be that a recording is too short.
     let few =
         ["--nothing", "2", "--per-kind", "0", "--pairs", "0", "--triples", "0", "--outside", "0", "--seconds", "1"];
     let [many, one] = ["1000000", "1"].map(|jobs| benchmarks(&[&["undeclared", "--jobs", jobs], &few[..]].concat()));
@@ -36,27 +37,27 @@ fn benchmarks_have_limits() {
 }
 
 #[test]
-fn json_goes_to_a_file_beside_the_tables_or_alone_to_standard_output() {
-    let losses = ["losses", "--records", "2", "--samples-log2", "14", "--jobs", "1", "--json"];
+fn the_result_goes_to_standard_output_or_to_a_file() {
+    let losses = ["losses", "--records", "2", "--samples-log2", "14", "--jobs", "1"];
     let dir = tempfile::tempdir().expect("a folder");
     let file = dir.path().join("losses.json");
-    let beside = benchmarks(&[&losses[..], &[file.to_str().expect("UTF-8")]].concat());
-    let alone = benchmarks(&[&losses[..], &["-"]].concat());
-    let json = std::fs::read(&file).expect("written");
-    assert_eq!(alone.stdout, json);
+    let written = benchmarks(&[&losses[..], &["-o", file.to_str().expect("UTF-8")]].concat());
+    let json = benchmarks(&losses).stdout;
+    assert_eq!(std::fs::read(&file).expect("written"), json);
+    assert!(written.stdout.is_empty());
     let value: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
-    assert_eq!((&value["records"], &value["samples"]), (&2.into(), &16_384.into()));
-    let tables = String::from_utf8(beside.stdout).expect("UTF-8");
-    assert!(tables.contains("white and walk") && !tables.contains('{'), "{tables}");
+    assert_eq!(
+        (&value["benchmark"], &value["records"], &value["samples"]),
+        (&"losses".into(), &2.into(), &16_384.into())
+    );
 
     let absent = dir.path().join("absent/losses.json");
-    let output = benchmarks(&[&losses[..], &[absent.to_str().expect("UTF-8")]].concat());
+    let output = benchmarks(&[&losses[..], &["-o", absent.to_str().expect("UTF-8")]].concat());
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("absent/losses.json"), "{error}");
-    assert!(output.stdout.is_empty(), "checked before the work is done");
 }
 
-/// Without stamps a rate is needed.
+/// A recording without time stamps needs a rate.
 #[test]
 fn measured_noise_is_read_from_a_table_and_an_unusable_one_is_named() {
     let dir = tempfile::tempdir().expect("a folder");
@@ -71,6 +72,6 @@ fn measured_noise_is_read_from_a_table_and_an_unusable_one_is_named() {
     assert!(without.status.code() == Some(1) && error.contains("noise.csv") && error.contains("--rate"), "{error}");
     let with = benchmarks(&["measured", name, "--rate", "100", "--stretches", "1", "--seconds", "10", "--jobs", "1"]);
     assert_eq!(with.status.code(), Some(0), "{}", String::from_utf8_lossy(&with.stderr));
-    let table = String::from_utf8(with.stdout).expect("UTF-8");
+    let table = tables::of("measured", &serde_json::from_slice(&with.stdout).expect("JSON"));
     assert!(table.contains("noise.csv") && table.contains("telegraph"), "{table}");
 }

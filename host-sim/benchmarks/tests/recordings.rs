@@ -12,7 +12,8 @@ fn means(of: &Measurement, quantity: Quantity) -> Vec<f64> {
     channels.map(|channel| channel.profile.lsb * mean(&channel.counts)).collect()
 }
 
-/// 10,000 rows at 100 Hz, the first 3,000 turning; gravity tells m/s² and rad/s.
+/// The file has 10,000 rows at 100 Hz, and the sensor turns in the first 3,000. Gravity shows that the units are m/s²
+/// and rad/s.
 #[test]
 fn units_are_guessed_and_what_moves_is_left_out() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -33,13 +34,14 @@ fn units_are_guessed_and_what_moves_is_left_out() {
     assert_eq!(name, "table.csv");
     assert!((samples.sample_rate_hz - 100.0).abs() < 1e-3, "{} Hz", samples.sample_rate_hz);
     assert!((7_000 - 2 * 256..=7_000).contains(&samples.len()), "{} samples", samples.len());
-    // 0.01 rad/s, known to 0.03 mrad/s.
+    // The rate of 0.01 rad/s is known to 0.03 mrad/s.
     let rates = means(&samples, Quantity::AngularRate);
     assert!((rates[1] - 0.01_f64.to_degrees()).abs() < 0.006 && rates[2].abs() < 0.006, "{rates:?} °/s");
     assert!((means(&samples, Quantity::SpecificForce)[2] - 9.81 / 9.80665).abs() < 1e-3);
 }
 
-/// Rates, samples and gyroscopes by the files' descriptions. Gravity within the scale error: units are right.
+/// Rates, samples and gyroscopes are those of the files' descriptions. Gravity within the scale error shows that the
+/// units are right.
 #[test]
 fn recordings_of_other_sensors_are_read_where_they_are_at_rest() {
     let test = "recordings_of_other_sensors_are_read_where_they_are_at_rest";
@@ -55,10 +57,10 @@ fn recordings_of_other_sensors_are_read_where_they_are_at_rest() {
         let NoiseRecording { name, samples: read } = NoiseRecording::read(&path, None).expect("a recording");
         assert_eq!(name, file);
         assert!((read.sample_rate_hz / rate_hz - 1.0).abs() < 0.01, "{file}: {} Hz", read.sample_rate_hz);
-        // 2 % of the phone's rows may be repeated.
+        // Up to 2 % of the phone's rows may be repeated.
         assert!((read.len() as f64 / f64::from(samples) - 1.0).abs() < 0.03, "{file}: {} samples", read.len());
         let [rates, forces] = [Quantity::AngularRate, Quantity::SpecificForce].map(|quantity| means(&read, quantity));
-        // Uncalibrated: a few °/s.
+        // The sensors are uncalibrated, with biases of a few °/s.
         assert!(rates.len() == 3 && rates.iter().all(|rate| rate.abs() < 5.0), "{file}: {rates:?} °/s");
         assert_eq!(forces.len(), if has_force { 3 } else { 0 }, "{file}");
         let norm = forces.iter().map(|force| force * force).sum::<f64>().sqrt();

@@ -1,5 +1,6 @@
-//! Slope method and fit over hours against theory.
+//! Slope method and fit over simulated hours, compared with theory.
 
+use crate::tables;
 use benchmarks::reproduction::Reproduction;
 
 const SEEDS: u64 = 16;
@@ -9,20 +10,21 @@ fn the_slope_method_is_biased_by_the_other_terms_and_the_fit_is_not() {
     let result = Reproduction { seeds: SEEDS, first_seed: 1000 }.run(|_| ());
     let root = (SEEDS as f64).sqrt();
     for term in 0..3 {
-        // Four deviations, known to a fifth. 0.1 % for flicker noise in the filter.
+        // The tolerance is four deviations, which are known to a fifth, and 0.1 % for flicker noise in the filter.
         for (errors, expected) in
             [(&result.plain, result.inherent[term]), (&result.overlapped, result.inherent[term]), (&result.fitted, 0.0)]
         {
             let error = errors[term];
             assert!((error.bias - expected).abs() < 1e-3 + 4.0 * error.scatter / root, "term {term}: {result:#?}");
         }
-        // 11 or fewer of 16: 1/1000.
+        // Of 16 intervals, 11 or fewer cover once in 1000 cases.
         assert!(result.covered[term] * SEEDS as f64 > 11.0, "term {term}: {result:#?}");
     }
-    // At 40 s and 80 s N²/τ, 0.441·B² and K²τ/3 add up to 1.60 times 0.664·B, at 160 s to 1.23 times K·√(τ/3).
+    // N²/τ, 0.441·B² and K²τ/3 sum to 1.60 times 0.664·B at 40 s and 80 s, and to 1.23 times K·√(τ/3) at 160 s.
     let [n, b, k] = result.inherent;
     assert!((b - 0.60).abs() < 0.01 && (k - 0.23).abs() < 0.01, "{b} {k}");
-    // B and K increase the result for N by 1.6 % at 1 s. The filter of L = 4 taps removes 0.7·2L/τ/204.8 of the variance.
+    // B and K increase the result for N by 1.6 % at 1 s. The filter of L = 4 taps removes 0.7·2L/τ/204.8 of the
+    // variance.
     assert!((-0.02..0.0).contains(&n), "{n}");
 
     for octave in result.scatter.iter().filter(|octave| octave.tau_s < 400.0) {
@@ -33,8 +35,9 @@ fn the_slope_method_is_biased_by_the_other_terms_and_the_fit_is_not() {
         let square = 15.0 * (octave.plain / octave.formula).powi(2);
         assert!(octave.tau_s < 0.15 || (2.4..44.3).contains(&square), "{octave:?}");
     }
-    let mut text = Vec::new();
-    result.write(&mut text).expect("a vector can be written");
-    let text = String::from_utf8(text).expect("text");
-    assert!(text.contains("16 simulated hours") && text.lines().all(|line| line.chars().count() <= 110), "{text}");
+    let text = tables::of("paper", &serde_json::to_value(&result).expect("JSON"));
+    assert!(
+        text.contains("16 simulated hours") && text.contains("Four methods") && text.contains("95 % if true"),
+        "{text}"
+    );
 }

@@ -5,3 +5,4 @@ mod losses;
 mod program;
 mod recordings;
 mod reproduction;
+mod tables;

@@ -1,5 +1,5 @@
 
-// The device, live.
+// The live view of a device on a serial port.
 (() => {
   const { element, show, Thread, save, saveFrom, open, bytesOf } = observatory;
   const SHOWN_LINES = 300;
@@ -7,7 +7,7 @@
   show("no-serial", !navigator.serial);
   show("connect", Boolean(navigator.serial));
 
-  // The image of the Pico: inside, or a file beside the page.
+  // The image of the Pico is in this page, or in a file beside it.
   const IMAGE = "observatory-pico.uf2";
   const image = element("image").textContent;
   show("flash", Boolean(image));
@@ -25,9 +25,9 @@
     shown.textContent = [...shown.textContent.split("\n"), ...lines].slice(-SHOWN_LINES).join("\n").trimStart();
     shown.scrollTop = shown.scrollHeight;
   };
-  // Its own thread: an analysis does not stop the live view.
+  // The live view has its own thread, so an analysis does not stop it.
   const thread = new Thread();
-  // The port, and what it sent and was not looked at yet.
+  // The state of the connection: the port, and the received bytes that are not decoded yet.
   let device = null;
   const send = async (command) => {
     if (!device.port.writable) throw new Error("the device is disconnected");
@@ -39,7 +39,7 @@
     }
   };
   const receive = async (connected) => {
-    // After an error of the line, such as an overrun, the port has another stream; after it was unplugged, none.
+    // After an error of the line, such as an overrun, the port has a new stream; after it was unplugged, it has none.
     while (connected.isOpen && connected.port.readable) {
       const reader = connected.reader = connected.port.readable.getReader();
       try {
@@ -58,7 +58,7 @@
     }
     connected.isOpen = false;
   };
-  // Shows what has come; whether anything has.
+  // Decodes and shows the bytes received since the last call. Resolves to true if there were any.
   const look = async () => {
     const waiting = device.waiting.splice(0);
     const request = { silence_s: (performance.now() - device.received) / 1000 };

@@ -7,7 +7,7 @@ const observatory = (() => {
   const CANCELLED = "Cancelled.";
   const SIMULATED_HZ = 204.8;
 
-  // The program: inside of this file, or beside it.
+  // The program is in this file, or in a file beside it.
   const bytesOf = (base64) => Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
   const compressed = async () => {
     const inside = element("program").textContent;
@@ -27,7 +27,7 @@ const observatory = (() => {
     return WebAssembly.compile(bytes);
   })();
 
-  // The program in a worker. Its calls are answered one after the other.
+  // Runs the program in a worker, which answers calls in order.
   const workerUrl = URL.createObjectURL(new Blob([element("worker").textContent], { type: "text/javascript" }));
   class Thread {
     #worker = null;
@@ -44,7 +44,7 @@ const observatory = (() => {
       if (this.#worker) return this.#worker;
       const begun = this.#worker = new Worker(workerUrl);
       begun.onmessage = ({ data }) => {
-        // One that was ended may have sent it before.
+        // A worker that was ended may have sent this message before.
         if (begun !== this.#worker) return;
         if ("task" in data) return this.#calls[0].progress(data);
         if (data.isBroken) return this.end(data.error);
@@ -62,13 +62,13 @@ const observatory = (() => {
     }
   }
 
-  // Tasks, one after the other, with their progress and errors.
+  // Runs one task at a time, and shows its progress and its error.
   const thread = new Thread();
   let job = null;
   const call = (name, request, file, total) => thread.run(name, request, file, ({ task, done }) => {
     const [what, most] = [["reading", file?.size], ["analysing", STAGES.length], ["simulating", total]][task];
     element("progress").max = most || 1;
-    // A file is read more than once.
+    // The progress starts again, since a file is read more than once.
     element("progress").value = task === 0 ? done % (most || 1) : done;
     job.what = task === 1 ? `${what}: ${STAGES[done]}, ${done + 1} of ${STAGES.length}` : what;
     tell();
@@ -100,7 +100,7 @@ const observatory = (() => {
   };
   element("cancel").addEventListener("click", () => thread.end(CANCELLED));
 
-  // The report.
+  // State and functions of the report.
   let report = null;
   const frame = element("frame");
   frame.addEventListener("load", () => {
@@ -140,7 +140,7 @@ const observatory = (() => {
     });
   });
 
-  // Recordings.
+  // Functions of the recordings.
   const list = (text) => text.split(",").map((word) => word.trim()).filter(Boolean);
   const options = (form) => {
     const fields = Object.fromEntries([...new FormData(form)].map(([name, value]) => [name, value.trim()]));

@@ -1,5 +1,5 @@
 "use strict";
-// The program in a thread of its own: a cancelled one is ended with its thread.
+// Runs the program in its own thread, since a task is cancelled by ending the thread.
 let program;
 let panic = "";
 const PART_BYTES = 1 << 23;
@@ -8,7 +8,7 @@ const page = {
   progress: (() => {
     let last = 0, of = -1;
     return (task, done) => {
-      // Not more often than is drawn.
+      // Progress within a task is sent at most every 100 ms, except in the analysis (task 1).
       if (task === of && task !== 1 && Date.now() - last < 100) return;
       [last, of] = [Date.now(), task];
       postMessage({ task, done });
@@ -36,7 +36,7 @@ const call = ({ name, request, file }) => {
 let ready;
 onmessage = async ({ data }) => {
   if (data instanceof WebAssembly.Module) {
-    // Other imports are those of crates that ask a browser for random numbers, which nothing here does.
+    // The other imports belong to crates that get random numbers from a browser. The program needs no random numbers.
     const unused = () => { throw new Error("not in this page"); };
     const imports = { page };
     for (const { module, name } of WebAssembly.Module.imports(data)) if (module !== "page") (imports[module] ??= {})[name] = unused;

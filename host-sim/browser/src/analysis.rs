@@ -1,4 +1,4 @@
-//! From the bytes of a recording to its report, as the command `imunoise` makes it.
+//! The report of a recording in memory, as the command `imunoise` makes it.
 
 use crate::host::{self, Task};
 use crate::recording_options::RecordingOptions;
@@ -21,7 +21,7 @@ use simulation::Simulation;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A recording in memory, and how it is read.
+/// A recording in memory, with the options for reading it.
 pub(crate) struct Recorded<'a> {
     /// Name of the file.
     pub(crate) name: &'a str,
@@ -29,7 +29,7 @@ pub(crate) struct Recorded<'a> {
     pub(crate) options: &'a RecordingOptions,
 }
 
-/// A report as the page keeps it.
+/// The files of a report that the page keeps.
 #[derive(Serialize)]
 struct ReportFiles {
     /// Headline of the report.
@@ -45,17 +45,17 @@ impl Recorded<'_> {
         Ok(RecordedInput::in_memory_monitored(Path::new(self.name), Arc::clone(&self.bytes), &monitor)?)
     }
 
-    /// The columns and units that are named.
+    /// The columns and units that the options name.
     pub(crate) fn selection(&self) -> Result<ColumnSelection> {
         Ok(ColumnSelection::parse(&self.options.columns, &self.options.units)?)
     }
 
-    /// All samples on their time base.
+    /// Reads all samples onto their time base.
     pub(crate) fn measurement(&self) -> Result<Measurement> {
         Ok(self.open_stream(KeptInMemory::ALL)?.stream.into_beginning())
     }
 
-    /// The report, as the page shows and saves it.
+    /// The report, for the page to show and save.
     pub(crate) fn report(&self) -> Result<String> {
         let OpenStream { stream, hash, notes } = self.open_stream(KEPT)?;
         let name = Printable(self.name).to_string();
@@ -83,7 +83,7 @@ impl Recorded<'_> {
     }
 }
 
-/// The report of what the virtual sensor records.
+/// The report of a simulated recording of the virtual sensor.
 pub(crate) fn simulated(simulation: &Simulation) -> Result<String> {
     let recording: Recording = simulation.run(|samples| host::progress(Task::Simulating, samples))?;
     let stream = SampleStream::recorded(recording, Reading::new(None, KEPT))?;

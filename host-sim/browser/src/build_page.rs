@@ -1,6 +1,6 @@
-//! `cargo run -p browser -- [--quick] [FOLDER [UF2]]` builds the page: FOLDER/index.html with the program beside it, for a web server, and
-//! FOLDER/observatory.html, one file with everything inside, which is opened from a disk. FOLDER is `target/browser` if none is named. UF2
-//! is the image of the Pico that the page offers. `--quick` builds in less time a program that is larger and slower.
+//! `cargo run -p browser -- [--quick] [FOLDER [UF2]]` builds the page. FOLDER/index.html has the program beside it, for a web server;
+//! FOLDER/observatory.html has everything in one file, to be opened from a disk. FOLDER is `target/browser` if not given. UF2 is the image
+//! of the Pico that the page offers. `--quick` builds faster, but a larger and slower program.
 
 use clap::ValueEnum;
 use flate2::Compression;
@@ -17,18 +17,20 @@ use std::process::{Command, ExitCode};
 use std::{env, fs};
 
 const PAGE: &str = include_str!("../page/page.html");
-/// After that of a report.
+/// The style of the page, which follows the style of a report.
 const STYLE: &str = include_str!("../page/style.css");
 const SCRIPT: &str = concat!(include_str!("../page/page.js"), include_str!("../page/device.js"));
 const WORKER: &str = include_str!("../page/worker.js");
 const TARGET: &str = "wasm32-unknown-unknown";
-/// Profiles of cargo: for whoever uses the page, and for whoever builds often.
+/// Profiles of cargo: one for users of the page, and one for fast builds.
 const PROFILE: &str = "browser";
 const QUICK_PROFILE: &str = "quick";
-/// The program and the image of the Pico beside the page; the program compressed: not every server compresses it.
+/// Names of the program and of the image of the Pico beside the page. The program is compressed, since some servers do
+/// not compress it.
 const PROGRAM: &str = "observatory.wasm.gz";
 const IMAGE: &str = "observatory-pico.uf2";
-/// The package of npm with `wasm-opt`, which takes a tenth off the program, and what every browser with Web Serial or wasm-unsafe-eval knows.
+/// The package of npm with `wasm-opt`, which makes the program a tenth smaller, and the features of WebAssembly that every browser with Web
+/// Serial supports.
 const OPTIMIZER: &str = "binaryen@132.0.0";
 const FEATURES: [&str; 6] = [
     "--enable-bulk-memory",
@@ -88,7 +90,7 @@ fn compressed(content: &[u8]) -> io::Result<Vec<u8>> {
 
 /// Compiles the library for browsers in a profile of cargo.
 fn build(workspace: &Path, target: &Path, profile: &str) -> Result<Vec<u8>, Box<dyn Error>> {
-    // Cargo, which runs this program, may hold the lock of its own folder.
+    // A separate folder: cargo, which runs this program, may hold the lock of its own.
     let target = target.join("browser-build");
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
@@ -105,7 +107,8 @@ fn build(workspace: &Path, target: &Path, profile: &str) -> Result<Vec<u8>, Box<
     Ok(read(&if profile == QUICK_PROFILE { program } else { optimized(program, &target.join("optimizer"))? })?)
 }
 
-/// The program as `wasm-opt` makes it smaller, which npm installs once in `folder`; as it was, with a note, where there is no npm.
+/// Returns the program optimized by `wasm-opt`, which npm installs once in `folder`. Without npm it prints a note and returns the program
+/// unchanged.
 fn optimized(program: PathBuf, folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let tool = folder.join("node_modules/.bin/wasm-opt");
     if !tool.exists() {
@@ -123,9 +126,9 @@ fn optimized(program: PathBuf, folder: &Path) -> Result<PathBuf, Box<dyn Error>>
     if status.success() { Ok(smaller) } else { Err("wasm-opt fails".into()) }
 }
 
-/// The page, with the compressed image of the Pico as text or its name, if there is one, and with the program inside as text or beside it. Its policy allows
-/// the scripts in it and in a report, by their hashes; no request but that for the program; and that only until it is loaded, as the
-/// script sees to.
+/// The page. It has the compressed image of the Pico as text or its name, if there is one, and the program inside as text or beside it. Its
+/// policy allows only the scripts of the page and of a report, by their hashes, and the request for the program. The script forbids that
+/// request once the program is loaded.
 fn page(image: Option<&str>, program: Option<&str>) -> String {
     let scripts = [SCRIPT, reports::page::SCRIPT].map(|script| format!("'sha256-{}'", base64(&Sha256::digest(script))));
     let connect = if program.is_some() { "" } else { " connect-src 'self';" };

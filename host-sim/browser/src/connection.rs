@@ -1,4 +1,4 @@
-//! A device that the page has opened by Web Serial: what it sends as the live view and as lines, and the steps of the bench.
+//! A device that the page has opened by Web Serial: its live view, its lines, and the steps of the bench.
 
 use anyhow::{Context, Result};
 use link::{Decoder, Message, Received};
@@ -18,22 +18,22 @@ pub(crate) struct Connection {
     bench: Option<BenchRun>,
 }
 
-/// Beside the bytes of the device.
+/// Request that accompanies bytes of the device.
 #[derive(Deserialize)]
 pub(crate) struct ReceiveRequest {
-    /// Time since something was received, s.
+    /// Time since the last byte was received, s.
     silence_s: f64,
 }
 
-/// Content of the bytes.
+/// The results of received bytes.
 #[derive(Serialize)]
 struct ReceivedParts {
     /// The live view.
     html: String,
     lines: Vec<String>,
-    /// Bursts of the raw stream.
+    /// Number of bursts of the raw stream.
     bursts: usize,
-    /// True when the answer to the step of the bench is whole.
+    /// True if the answer to the step of the bench is complete.
     is_answered: bool,
 }
 
@@ -47,7 +47,7 @@ enum BenchStep {
         position: usize,
         steps: usize,
     },
-    /// The settings are restored one after the other, each with a pause after it.
+    /// The end: the settings to restore one after the other, each followed by a pause.
     End {
         table: String,
         restore: Vec<String>,
@@ -61,7 +61,7 @@ impl Connection {
         Self { messages: LatestMessages::new(name), ..Self::default() }
     }
 
-    /// Takes bytes of the device.
+    /// Processes bytes of the device.
     pub(crate) fn receive(&mut self, bytes: &[u8], ReceiveRequest { silence_s }: &ReceiveRequest) -> Result<String> {
         let mut parts = ReceivedParts { html: String::new(), lines: Vec::new(), bursts: 0, is_answered: false };
         for received in bytes.iter().filter_map(|byte| self.decoder.push(*byte)) {
@@ -79,7 +79,7 @@ impl Connection {
         Ok(serde_json::to_string(&parts)?)
     }
 
-    /// Begins the bench.
+    /// Starts the bench.
     pub(crate) fn begin_bench(&mut self) {
         self.bench = Some(BenchRun::new(&BenchPlan::default(), self.decoder.counters()));
     }

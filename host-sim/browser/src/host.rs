@@ -1,14 +1,14 @@
-//! Messages to the page while a function runs.
+//! Messages to the page during a function.
 
-/// Task under way.
+/// The task that runs.
 #[derive(Debug, Clone, Copy)]
 #[repr(u32)]
 pub(crate) enum Task {
-    /// Bytes of the recording.
+    /// Reading; progress is in bytes of the recording.
     Reading = 0,
-    /// Stages of the analysis.
+    /// Analysing; progress is in stages of the analysis.
     Analysing = 1,
-    /// Samples of the virtual sensor.
+    /// Simulating; progress is in samples of the virtual sensor.
     Simulating = 2,
 }
 
@@ -21,7 +21,7 @@ mod page {
     }
 }
 
-/// Tells how much of a task is done.
+/// Reports how much of a task is done.
 pub(crate) fn progress(task: Task, done: u64) {
     #[cfg(target_family = "wasm")]
     page::progress(task as u32, done as f64);
@@ -29,7 +29,7 @@ pub(crate) fn progress(task: Task, done: u64) {
     let _ = (task, done);
 }
 
-/// Tells the page why the program ends, where it does.
+/// Sends the message of a panic to the page.
 pub(crate) fn set_panic_hook() {
     #[cfg(target_family = "wasm")]
     std::panic::set_hook(Box::new(|panic| {

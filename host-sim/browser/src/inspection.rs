@@ -1,4 +1,4 @@
-//! Content of a recording as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
+//! The contents of a recording as HTML: the table of `imunoise inspect`, and for each sensor a form with the proposal.
 
 use crate::analysis::Recorded;
 use anyhow::Result;
@@ -7,16 +7,16 @@ use measurement::profile_file;
 use recordings::file_format::{RecordedFormat, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::time_base::TimeRange;
-use reports::rounding::plain;
+use reports::rounding::{compact, plain};
 use reports::summary::time_options;
 
-/// Columns of a table, and topics, that are shown at most.
+/// Most columns of a table, and most topics, that are shown.
 const MOST_COLUMNS: usize = 64;
 const MOST_TOPICS: usize = 32;
-/// Columns of a table beyond which those that never change are not shown.
+/// Number of columns of a table above which constant columns are not shown.
 const WIDE: usize = 16;
 
-/// A table for each topic, and a form for each sensor.
+/// Makes a table for each topic, and a form for each sensor.
 pub(crate) fn html(recorded: &Recorded<'_>) -> Result<String> {
     let input = recorded.open()?;
     let is_bus_log = matches!(input.format(), RecordedFormat::FrameLog | RecordedFormat::SpiExport);
@@ -25,11 +25,11 @@ pub(crate) fn html(recorded: &Recorded<'_>) -> Result<String> {
     let others = if is_bus_log || is_read("") { Vec::new() } else { input.contents()? };
     let others: Vec<TopicDescription> = others.into_iter().filter(|of| !is_read(&of.name)).collect();
     let several = if is_bus_log { Vec::new() } else { input.sensors()? };
-    // Register counts in the program's own format need no option.
+    // Register counts in the program's own format need no options.
     let is_known =
         matches!(input.format(), RecordedFormat::CountTable | RecordedFormat::FrameLog | RecordedFormat::SpiExport);
     let proposals: Vec<&Proposal> = tables.iter().flat_map(|table| &table.proposals).filter(|_| !is_known).collect();
-    // An only sensor that the format knows is found without its name.
+    // If the file has one sensor that the format identifies, the form needs no topic.
     let needs_topic = |proposal: &Proposal| proposals.len() != 1 || !several.is_empty() || !proposal.is_found;
     let nothing = Proposal { is_found: is_known, ..Proposal::default() };
     let unknown = Some(&nothing).filter(|_| proposals.is_empty());
@@ -52,7 +52,7 @@ pub(crate) fn html(recorded: &Recorded<'_>) -> Result<String> {
 fn columns(table: &InspectedTable) -> Markup {
     let InspectedTable { topic, kind, rows, is_cut, columns, rate, stated_rate_hz, duration_s, missing, gaps, .. } =
         table;
-    // A wide table is one of messages with covariances.
+    // A wide table usually has messages with covariances, which are constant.
     let is_constant = |column: &InspectedColumn| {
         columns.len() > WIDE && column.noise == 0.0 && column.guess.is_none() && !column.mean.is_nan()
     };
@@ -106,27 +106,15 @@ fn row(column: &InspectedColumn) -> Markup {
                 @if !reason.is_empty() { span.under { (reason) } }
             } }
             td { (unit.unwrap_or("")) }
-            td { @if is_number { @for value in first { (short(*value)) " " } } @else { "no numbers" } }
-            td.number { @if is_number { (short(*mean)) } }
-            td.number { @if is_number { (short(*noise)) } }
-            td.number { @if let Some(step) = step { (short(*step)) } }
+            td { @if is_number { @for value in first { (compact(*value, 6)) " " } } @else { "no numbers" } }
+            td.number { @if is_number { (compact(*mean, 6)) } }
+            td.number { @if is_number { (compact(*noise, 3)) } }
+            td.number { @if let Some(step) = step { (compact(*step, 6)) } }
         }
     }
 }
 
-/// A number in six digits; whole ones have all of theirs.
-fn short(value: f64) -> String {
-    let magnitude = value.abs();
-    if value.fract() == 0.0 && magnitude < 1e15 {
-        format!("{value:.0}")
-    } else if (1e-3..1e7).contains(&magnitude) {
-        plain(value, 6)
-    } else {
-        format!("{value:.5e}")
-    }
-}
-
-/// The options with which a sensor is analysed, to be confirmed or changed.
+/// A form with the options for a sensor, to be confirmed or changed.
 fn form(proposal: &Proposal, needs_topic: bool) -> Markup {
     let Proposal { topic, columns, units, part, lacks_rate, is_guessed, sensor, doubts, .. } = proposal;
     let part = part.map(TimeRange::whole_tenths);

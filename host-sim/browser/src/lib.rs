@@ -1,8 +1,8 @@
-//! The analysis in a browser: functions that a page calls in a worker, without any generated code between them.
+//! The analysis in a browser: functions that a page calls in a worker, without generated code between them.
 //!
-//! The page writes a request into the memory that [`reserve_request`] gives, as JSON, and the bytes of a recording into that of
-//! [`reserve_file`]; it calls a function, and reads the answer at [`answer_pointer`]. A function returns 0 where the answer is what was
-//! asked for, and 1 where it is the sentence of an error. On the way it calls the imported function `progress`.
+//! The page writes a request as JSON into the memory of [`reserve_request`], and the bytes of a recording into that of [`reserve_file`]. It
+//! calls a function, and reads the answer at [`answer_pointer`]. A function returns 0 if the answer is the result, and 1 if it is the
+//! message of an error. Meanwhile the function calls the imported function `progress`.
 
 mod analysis;
 mod connection;
@@ -24,14 +24,14 @@ use simulation::Simulation;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Requests of the page, and answers to it.
+/// The requests of the page, and the answers.
 #[derive(Default)]
 struct Exchange {
     request: Vec<u8>,
     file: Option<Arc<[u8]>>,
-    /// Recordings whose noise is to be compared.
+    /// The recordings to be compared.
     measured: Vec<Measurement>,
-    /// The device.
+    /// The connection to the device.
     connection: Option<Connection>,
     answer: Vec<u8>,
 }
@@ -44,7 +44,7 @@ fn with<R>(change: impl FnOnce(&mut Exchange) -> R) -> R {
     EXCHANGE.with_borrow_mut(change)
 }
 
-/// Memory for a request of so many bytes.
+/// Returns memory for a request of `bytes` bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn reserve_request(bytes: usize) -> *mut u8 {
     with(|exchange| {
@@ -53,7 +53,7 @@ pub extern "C" fn reserve_request(bytes: usize) -> *mut u8 {
     })
 }
 
-/// Memory for a recording of so many bytes, which replaces the one before it.
+/// Returns memory for a recording of `bytes` bytes, which replaces the previous one.
 #[unsafe(no_mangle)]
 pub extern "C" fn reserve_file(bytes: usize) -> *mut u8 {
     with(|exchange| {
@@ -65,7 +65,7 @@ pub extern "C" fn reserve_file(bytes: usize) -> *mut u8 {
     })
 }
 
-/// First byte of the answer.
+/// Address of the first byte of the answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer_pointer() -> *const u8 {
     with(|exchange| exchange.answer.as_ptr())
@@ -77,11 +77,11 @@ pub extern "C" fn answer_length() -> usize {
     with(|exchange| exchange.answer.len())
 }
 
-/// A request that names a recording, and says how it is read.
+/// A request with the name of a recording and the options for reading it.
 #[derive(Deserialize)]
 struct RecordingRequest {
     name: String,
-    /// True for the first of those to be compared.
+    /// True for the first recording to be compared.
     #[serde(default, rename = "isFirst")]
     is_first: bool,
     #[serde(flatten)]
@@ -95,13 +95,13 @@ impl RecordingRequest {
     }
 }
 
-/// Content of a recording: HTML with a form for each sensor.
+/// The contents of a recording as HTML, with a form for each sensor.
 #[unsafe(no_mangle)]
 pub extern "C" fn inspect() -> u32 {
     answer(|request: RecordingRequest| inspection::html(&request.recorded()?))
 }
 
-/// The report of a recording: its page and its JSON.
+/// The report of a recording, as a page and as JSON.
 #[unsafe(no_mangle)]
 pub extern "C" fn analyse() -> u32 {
     answer(|request: RecordingRequest| request.recorded()?.report())
@@ -112,11 +112,11 @@ pub extern "C" fn analyse() -> u32 {
 struct SimulationRequest {
     seconds: f64,
     seed: u64,
-    /// N, B and K alone.
+    /// True for N, B and K alone.
     plain: bool,
 }
 
-/// The report of the virtual sensor, as that of a recording.
+/// The report of a simulated recording, in the form of [`analyse`].
 #[unsafe(no_mangle)]
 pub extern "C" fn simulate() -> u32 {
     answer(|SimulationRequest { seconds, seed, plain }: SimulationRequest| {
@@ -126,7 +126,7 @@ pub extern "C" fn simulate() -> u32 {
     })
 }
 
-/// Keeps the samples of a recording for [`compare`]; with the first one, forgets those before it.
+/// Keeps the samples of a recording for [`compare`]. The first one replaces all earlier ones.
 #[unsafe(no_mangle)]
 pub extern "C" fn keep() -> u32 {
     answer(|request: RecordingRequest| {
@@ -141,7 +141,7 @@ pub extern "C" fn keep() -> u32 {
     })
 }
 
-/// Compares the noise of the recordings that were kept.
+/// Compares the noise of the kept recordings.
 #[unsafe(no_mangle)]
 pub extern "C" fn compare() -> u32 {
     answer(|(): ()| {
@@ -152,14 +152,14 @@ pub extern "C" fn compare() -> u32 {
     })
 }
 
-/// A report to write in the format of another program.
+/// A report to be written in the format of another program.
 #[derive(Deserialize)]
 struct ExportRequest {
-    /// Its JSON.
+    /// The report as JSON.
     report: String,
-    /// As `-o FORMAT=FILE` of the command calls it.
+    /// Name of the format, as in the option `-o FORMAT=FILE` of the command.
     format: String,
-    /// As the option `--combine-axes` calls it.
+    /// Choice for three axes, as in the option `--combine-axes` of the command.
     axis: String,
 }
 
@@ -175,7 +175,7 @@ pub extern "C" fn export() -> u32 {
     })
 }
 
-/// Begins a connection to a device; the request is the name of its port.
+/// Starts a connection to a device; the request is the name of its port.
 #[unsafe(no_mangle)]
 pub extern "C" fn connect_device() -> u32 {
     answer(|name: String| {
@@ -184,7 +184,8 @@ pub extern "C" fn connect_device() -> u32 {
     })
 }
 
-/// Takes bytes of the device as [`reserve_file`] has them: the live view and the lines.
+/// Processes bytes of the device, which are in the memory of [`reserve_file`]. The answer has the live view and the
+/// lines.
 #[unsafe(no_mangle)]
 pub extern "C" fn receive_bytes() -> u32 {
     answer(|request: ReceiveRequest| {
@@ -195,7 +196,7 @@ pub extern "C" fn receive_bytes() -> u32 {
     })
 }
 
-/// Begins the next step of the bench, the first one where the request is true: its command, or the table.
+/// Starts the next step of the bench, or the first one if the request is true. The answer is its command, or the table.
 #[unsafe(no_mangle)]
 pub extern "C" fn bench_step() -> u32 {
     answer(|is_first: bool| {
@@ -219,7 +220,7 @@ fn answer<T: DeserializeOwned>(serve: impl FnOnce(T) -> Result<String>) -> u32 {
     let request = with(|exchange| std::mem::take(&mut exchange.request));
     let served = serde_json::from_slice(&request).context("request").and_then(serve);
     let status = u32::from(served.is_err());
-    // A message that quotes its input has no character that a page must not show: the page sets it as text.
+    // A message that quotes its input needs no escaping: the page sets it as text.
     let text = served.unwrap_or_else(|error| format!("{error:#}"));
     with(|exchange| exchange.answer = text.into_bytes());
     status

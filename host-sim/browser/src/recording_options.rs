@@ -1,4 +1,4 @@
-//! How a recording is read: the options of the command `imunoise`, as the page sends them.
+//! The options of the command `imunoise` for reading a recording, as the page sends them.
 
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
@@ -8,28 +8,28 @@ use recordings::time_base::TimeRange;
 use reports::reading::ReadingOptions;
 use serde::Deserialize;
 
-/// The options; what is not said is left out.
+/// The options; those not given are absent.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct RecordingOptions {
     pub(crate) topic: Option<String>,
-    /// As in `gyro_x=wx`.
+    /// Assignments such as `gyro_x=wx`.
     pub(crate) columns: Vec<String>,
     pub(crate) units: Vec<String>,
-    /// Hz.
+    /// Sample rate, Hz.
     pub(crate) rate: Option<f64>,
     /// Name of an included profile.
     pub(crate) sensor: Option<String>,
-    /// Full scale of the gyros of an ADIS16405, °/s, if it is not 300.
+    /// Full scale of the gyros of an ADIS16405, °/s; absent for 300.
     pub(crate) range: Option<u32>,
-    /// s from the first sample.
+    /// Start of the part that is read, s from the first sample.
     pub(crate) from: Option<f64>,
-    /// s from the first sample.
+    /// End of the part that is read, s from the first sample.
     pub(crate) to: Option<f64>,
 }
 
 impl RecordingOptions {
-    /// As they are typed for the command.
+    /// The options as words of a command line.
     pub(crate) fn words(&self) -> Vec<String> {
         let Self { topic, columns, units, rate, sensor, range, from, to } = self;
         let (topic, sensor) = (topic.as_deref(), sensor.as_deref());
@@ -44,7 +44,7 @@ impl RecordingOptions {
     /// The range of the gyros of an ADIS16405.
     ///
     /// # Errors
-    /// It has no such range.
+    /// An ADIS16405 does not have this range.
     pub(crate) fn gyro_range(&self) -> Result<GyroRange> {
         Ok(match self.range {
             None | Some(300) => GyroRange::Dps300,
@@ -54,7 +54,7 @@ impl RecordingOptions {
         })
     }
 
-    /// The profile of the sensor, if one is named.
+    /// The profile of the sensor if one is named.
     ///
     /// # Errors
     /// There is no such profile.

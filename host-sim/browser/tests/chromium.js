@@ -1,13 +1,16 @@
-// Headless Chromium, driven over a pipe by its DevTools protocol: the page as a user has it, with all its requests, errors and downloads.
+// Drives headless Chromium over a pipe by the DevTools protocol. A page is as a user sees it; its requests, errors and downloads are kept.
 "use strict";
 const { spawn } = require("node:child_process");
 const fs = require("node:fs");
 const path = require("node:path");
 
-/** Longest time for what a page does, ms: a fault ends a test by it, and nothing else depends on it. */
+/** Longest time for an action of a page, ms. Only a failing test waits for its end. */
 const PATIENCE_MS = 300_000;
 
-/** Opens the page at `url`, lets `act` use it, and closes it; downloads and the profile of the browser go into `folder`; `script` runs before those of the page. */
+/**
+ * Opens the page at `url`, lets `act` use it, and closes it. Downloads and the profile of the browser are written into `folder`; `script`
+ * runs before the scripts of the page.
+ */
 exports.withPage = async (program, url, folder, act, script) => {
   const profile = fs.mkdtempSync(path.join(folder, "profile-"));
   const options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", `--user-data-dir=${profile}`,
@@ -22,7 +25,7 @@ exports.withPage = async (program, url, folder, act, script) => {
 };
 
 class Page {
-  /** Requests for anything that is not in the page, and what its console says. */
+  /** Addresses of requests for content outside of the page, and errors of its console. */
   requests = [];
   errors = [];
   #browser;
@@ -54,7 +57,7 @@ class Page {
   send(method, params = {}) {
     const id = this.#next++;
     const message = { id, method, params };
-    // The browser is asked, not the page.
+    // These methods are addressed to the browser; all others are addressed to the page by its session.
     if (this.#session && !/^(Target|Browser|SystemInfo)\./.test(method)) message.sessionId = this.#session;
     this.#browser.stdio[3].write(`${JSON.stringify(message)}\0`);
     return new Promise((resolve, reject) => this.#calls.set(id, { resolve, reject, method }));
@@ -73,7 +76,7 @@ class Page {
     this.#listeners = this.#listeners.filter((listener) => !listener(method, params));
   }
 
-  /** The parameters of the next event that `is` accepts. */
+  /** Resolves to the parameters of the next event `name` that `is` accepts. */
   event(name, is = () => true) {
     return new Promise((resolve, reject) => {
       const late = setTimeout(() => reject(new Error(`never: ${name}`)), PATIENCE_MS);
@@ -81,7 +84,7 @@ class Page {
     });
   }
 
-  /** The value of an expression in the page. */
+  /** Resolves to the value of an expression in the page. */
   async value(expression) {
     const { result, exceptionDetails } = await this.send("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true, userGesture: true });
     if (exceptionDetails) throw new Error(`${expression}: ${exceptionDetails.exception?.description ?? exceptionDetails.text}`);
@@ -97,12 +100,12 @@ class Page {
     }
   }
 
-  /** Waits until nothing is worked on. */
+  /** Waits until the page is not busy. */
   idle() { return this.until("!document.body.hasAttribute('aria-busy')"); }
 
   click(selector) { return this.value(`document.querySelector(${JSON.stringify(selector)}).click()`); }
 
-  /** Chooses files, as in the dialog of the browser, and waits until they were looked at. */
+  /** Chooses files, as the dialog of the browser does, and waits until they were inspected. */
   async choose(files) {
     const { root } = await this.send("DOM.getDocument");
     const { nodeId } = await this.send("DOM.querySelector", { nodeId: root.nodeId, selector: "#files" });
@@ -124,7 +127,7 @@ class Page {
     await this.send("Input.dispatchKeyEvent", { type: "keyUp", key, code: key === " " ? "Space" : key, windowsVirtualKeyCode });
   }
 
-  /** What `act` downloads: its name. */
+  /** Resolves to the name of the file that `act` downloads. */
   async download(act) {
     const begun = this.event("Browser.downloadWillBegin");
     const completed = this.event("Browser.downloadProgress", ({ state }) => state === "completed");

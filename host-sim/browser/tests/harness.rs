@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use system_tests::{note_skipped, one_at_a_time, target_folder, workspace};
 
-/// Names of the program.
+/// Names of the Chromium program.
 const CHROMIUM: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 fn runs(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
-/// In the place of an image of the Pico.
+/// Stands for an image of the Pico.
 pub(crate) const IMAGE: &[u8] = b"the bytes of an image";
 
-/// The folder of the page, built in a folder of its own with [`IMAGE`]; `BROWSER_PAGE` names one that was built before.
+/// The folder of the page, built with [`IMAGE`] in its own folder; `BROWSER_PAGE` names an existing one.
 fn page() -> PathBuf {
     if let Some(folder) = std::env::var_os("BROWSER_PAGE") {
         return folder.into();
@@ -30,8 +30,8 @@ fn page() -> PathBuf {
     folder
 }
 
-/// Runs `script` of this folder with Chromium, the page's address and a folder for what it saves, and `input` on its standard input.
-/// False, with a note, without Chromium or Node.js.
+/// Runs `script` of this folder with Chromium, the page's address, a folder for saved files, and `input` on standard input. False, with a
+/// note, if Chromium or Node.js is missing.
 pub(crate) fn drive(test: &str, script: &str, page_file: &str, folder: &Path, input: &str) -> bool {
     let chromium = CHROMIUM.into_iter().find(|name| runs(name)).filter(|_| runs("node"));
     let Some(chromium) = chromium else {
@@ -47,7 +47,7 @@ pub(crate) fn drive(test: &str, script: &str, page_file: &str, folder: &Path, in
         .stdin(Stdio::piped())
         .spawn()
         .expect("node starts");
-    // A script that fails at once has closed it.
+    // A script that fails at once has closed its input.
     let _ = node.stdin.take().expect("a pipe").write_all(input.as_bytes());
     assert!(node.wait().expect("node ends").success(), "{test}: see above");
     true

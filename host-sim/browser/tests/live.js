@@ -1,5 +1,5 @@
-// node live.js CHROMIUM URL FOLDER <INPUT: the page with a port that plays what a device answered to commands, one without Web Serial, and
-// the image of the Pico. What is compared with the command is written into FOLDER.
+// node live.js CHROMIUM URL FOLDER <INPUT: tests the page with a port that replays the answers of a device, and in a browser without Web
+// Serial, where the image of the Pico can be saved. FOLDER gets the files that the caller compares with those of the program.
 "use strict";
 const assert = require("node:assert");
 const fs = require("node:fs");
@@ -9,8 +9,8 @@ const { looks } = require("./looks.js");
 
 const [program, url, folder] = process.argv.slice(2);
 const { answers, points: expected, table, finding, image } = JSON.parse(fs.readFileSync(0));
-// A port whose device answers a command with what was recorded, at once. Pauses of the page end when the test asks for it, one after the
-// other, and its clock shows the time of the last one: what happens does not depend on the time that it takes.
+// A port that answers each command at once with its recorded answer. The page's pauses end one after the other when the test requests it,
+// and its clock shows the end of the last pause, so the result does not depend on the speed of the machine.
 const PORT = `(() => {
   const PATIENCE_MS = 100_000, LONGEST_PAUSE_MS = 1_000;
   const wait = window.setTimeout.bind(window);
@@ -32,7 +32,7 @@ const PORT = `(() => {
     },
     close: async () => { fake.readable = fake.writable = null; },
     receive: (bytes) => controller.enqueue(Uint8Array.from(bytes)),
-    // An error of the line: the port has a new stream. The end of the cable: it has none.
+    // After an error of the line the port has a new stream; after it is unplugged it has none.
     fail: (name, isUnplugged) => {
       const failed = controller;
       fake.readable = isUnplugged ? null : stream();
@@ -69,14 +69,14 @@ const withDevice = async (page) => {
   assert.equal(points, expected);
   await looks(page, "live");
 
-  // Noise on the line, and an overrun: the next report is taken all the same, and its curves are longer.
+  // The next report is received after noise on the line and an overrun, and its curves are longer.
   await page.value("fake.receive(Array.from({ length: 5000 }, (_, at) => (at * 7919) % 251))");
   await until(`!${text("live")}.includes(" 0 bytes of noise")`);
   await page.value('fake.fail("BufferOverrunError", false)');
   await page.value(send("r"));
   await until(`${POINTS} > ${points}`);
 
-  // A recording; the device forgets that it was asked for one.
+  // A recording continues although the device has forgotten the request for it.
   await page.click("#record");
   await until(`/Recording: [1-9]/.test(${text("device-status")})`);
   await until('fake.commands.filter((command) => command === "w 1").length === 2');
@@ -97,7 +97,7 @@ const withDevice = async (page) => {
   assert.equal(await page.value("fake.commands.at(-1)"), "i 10");
   await looks(page, "bench");
 
-  // Models of an epoch; and a device that says nothing any more.
+  // The page shows the models of an epoch, and then that the device sends nothing any more.
   await page.value(`fake.receive(${JSON.stringify(finding)})`);
   await until(`${text("live")}.includes("What was found")`);
   await until(`${text("live")}.includes("Nothing received for 15 s")`);
@@ -106,13 +106,13 @@ const withDevice = async (page) => {
   await page.value(send("help"));
   await until('fake.commands.at(-1) === "help"');
   assert.ok((await page.value('document.getElementById("log").textContent')).endsWith("> help"));
-  // The cable ends during a recording.
+  // The device is unplugged during a recording.
   await page.click("#record");
   await until('fake.commands.at(-1) === "w 1"');
   await page.value('fake.fail("NetworkError", true)');
   await until(`${text("device-status")}.includes("Disconnected") && ${text("device-status")}.includes("Recorded: 0 bursts")`);
   assert.ok(await page.value(isShown("connect")));
-  // It is plugged in again, and then let go.
+  // It is plugged in again, and then disconnected by the user.
   await page.click("#connect");
   await until(`${text("device-status")} === "Connected."`);
   await page.click("#disconnect");

@@ -1,4 +1,4 @@
-//! The page with a device, whose port plays what the firmware's image sends in the emulator.
+//! The page with a device. The port plays the output of the firmware's image in the emulator.
 
 use crate::harness::{IMAGE, drive};
 use crate::same_report::{TOLERANCE_OF_SIMULATION, differences_from_command};
@@ -8,12 +8,12 @@ use observatory::bench::{BenchPlan, BenchRun, checks, write_table};
 use serde_json::json;
 use system_tests::stm32f4::{Typed, h405_image, run};
 
-/// One message of each kind, the terms and regressors of a channel among them.
+/// One message of each kind, including the terms and regressors of a channel.
 const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4-mixed-alarm.bin");
 /// Time for a report, s.
 const REPORT_S: f64 = 3.0;
-/// The emulated board is asked for less than the page asks for. A step that is repeated has its answer again, and the pauses of the page
-/// are no time of the board.
+/// The emulated board does less than the page requests. A repeated step gets its answer again, and the pauses of the page take no time of
+/// the board.
 const SHORT: BenchPlan = BenchPlan { reads: 10_000, noise_s: 1.5, bursts_s: 2.0 };
 
 /// The answers of the emulated Olimex STM32-H405 to two requests for a report, to the start and the end of a recording, and to the steps of
@@ -28,18 +28,18 @@ fn answers() -> Vec<(String, Vec<u8>)> {
     let Outcome { received, sensor, .. } = run(h405_image(), Scenario { sensor, keys, seconds, ..Scenario::default() });
     assert_eq!(sensor.expect("a sensor").violations, [""; 0]);
     let answers = typed.answers(&received).into_iter().map(|(command, bytes)| (command.to_owned(), bytes));
-    // The page does not turn the reports off that the device sends by itself.
+    // The page does not turn off the reports that the device sends by itself.
     answers.skip(1).collect()
 }
 
-/// `live.js` says what is looked at. The table of the bench, of which every check passes, and the report of a recording are those of the
-/// command.
+/// `live.js` defines what is checked. Every check of the bench passes, and the table of the bench and the report of a recording equal those
+/// of the command.
 #[test]
 fn a_device_is_shown_recorded_and_checked() {
     const TEST: &str = "live::a_device_is_shown_recorded_and_checked";
     let mut answers = answers();
     let mut short_bench = answers.split_off(4).into_iter().peekable();
-    // The page asks again when the stream ends.
+    // The page repeats its request when the stream ends.
     answers.insert(3, ("w 1".to_owned(), Vec::new()));
     let (mut decoder, plan) = (Decoder::new(), BenchPlan::default());
     // Points of the curves of gyros and accelerometers in each report.
@@ -67,7 +67,7 @@ fn a_device_is_shown_recorded_and_checked() {
     assert_eq!(short_bench.next(), None, "every step has its answer");
     let checks = checks(&bench.finish(decoder.counters()));
     for check in &checks {
-        // One port, and so no second one.
+        // There is one port, so the check of a second port is not run.
         assert!(check.cause.is_none() && (!check.measured.is_empty() || check.name == "second port"), "{check:?}");
     }
     assert!(checks.len() >= 20, "{}", checks.len());
@@ -81,7 +81,7 @@ fn a_device_is_shown_recorded_and_checked() {
     if !drive(TEST, "live.js", "observatory.html", folder.path(), &input.to_string()) {
         return;
     }
-    // The page has saved it by this name.
+    // The page has saved the recording under this name.
     let recording = folder.path().join("device.bin");
     std::fs::rename(folder.path().join("recorded.bin"), &recording).expect("recorded");
     let report = folder.path().join("recorded.json");

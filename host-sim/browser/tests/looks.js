@@ -1,9 +1,9 @@
-// Looks of a page: nothing is wider than the window, and text has its contrast.
+// Checks the appearance of a page: no element is wider than the window, and text has sufficient contrast.
 "use strict";
 const assert = require("node:assert");
 const path = require("node:path");
 
-// Text of less contrast than 4.5 (WCAG 2.2, 1.4.3), or 3 where it is large, as [contrast, text].
+// Texts with a contrast below 4.5, or below 3 if they are large (WCAG 2.2, criterion 1.4.3), as [contrast, text].
 const FAINT = `(() => {
   const parse = (colour) => colour.match(/[\\d.]+/g).map(Number);
   const light = (colour) => {
@@ -30,7 +30,7 @@ const FAINT = `(() => {
   return faint;
 })()`;
 
-/** Checks the page at three widths on light and on dark ground; the folder PICTURES, if it is named, gets pictures. */
+/** Checks the page at three widths with light and dark colours. The folder PICTURES, if set, gets screenshots. */
 exports.looks = async (page, what) => {
   for (const width of [400, 800, 1280]) {
     for (const isDark of [false, true]) {

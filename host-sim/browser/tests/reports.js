@@ -1,5 +1,5 @@
-// node reports.js CHROMIUM URL FOLDER <JOBS: the page analyses each file, as confirmed or with stated options, and saves the JSON of its
-// report in FOLDER. A job is {file, fields, name}; without a file it is {simulate: {seconds, seed}, name}.
+// node reports.js CHROMIUM URL FOLDER <JOBS: lets the page analyse each file, with the proposed or with stated options, and saves the JSON
+// of the report in FOLDER. A job is {file, fields, name}, or {simulate: {seconds, seed}, name} without a file.
 "use strict";
 const assert = require("node:assert");
 const fs = require("node:fs");

@@ -1,4 +1,4 @@
-//! The report of the page and that of the command, of the same file with the same options.
+//! The report of the page equals that of the command for the same file and options.
 
 use crate::harness::drive;
 use serde_json::{Value, json};
@@ -6,19 +6,20 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use system_tests::{host_sim, recorded_samples};
 
-/// Largest relative difference of two numbers in the reports of a file. The page computes elementary functions by Rust's `libm`, the command by
-/// the system's library: of the values of `exp`, `ln`, `sin`, `cos` and `powf` at random places 3 to 10 % differ by one unit in the last place.
+/// Largest relative difference of two numbers in the reports of a file. The page computes elementary functions by Rust's `libm`, the
+/// command by the system's library. At random arguments, 3 to 10 % of the values of `exp`, `ln`, `sin`, `cos` and `powf` differ by one unit
+/// in the last place.
 const TOLERANCE: f64 = 1e-6;
-/// Largest difference in those of a simulation. The baseline model is fitted in single precision, as on the device: where what is fitted differs in the
-/// last place of double precision, a squared coefficient may differ by four units of 2⁻²³, 5·10⁻⁷. A deviance is quadratic in what the model is
-/// off by, 2.8 % of the variance of the supply, and differs by twice the ratio of the two.
+/// Largest relative difference of two numbers in the reports of a simulation. The baseline model is fitted in single precision, as on the
+/// device. If its input differs in the last place of double precision, a squared coefficient may differ by four units of 2⁻²³, 5·10⁻⁷. A
+/// deviance is quadratic in the model's error, 2.8 % of the variance of the supply, and differs by twice the ratio of the two.
 pub(crate) const TOLERANCE_OF_SIMULATION: f64 = 2.0 * 4.0 * f32::EPSILON as f64 / 0.028;
-/// Names of options and of fields of the page.
+/// Names of options, with the names of the page's fields.
 const OPTIONS: [(&str, &str); 5] =
     [("--columns", "columns"), ("--units", "units"), ("--rate", "rate"), ("--sensor", "sensor"), ("--topic", "topic")];
 
-/// Lists the differences of two values: kinds, order, words and integers are equal, numbers to a relative `tolerance`. A small probability is the
-/// exponential of a statistic: its relative error is that of the statistic times its own logarithm.
+/// Lists the differences of two values. Kinds, order, words and integers must be equal, numbers up to a relative `tolerance`. A small
+/// probability is the exponential of a statistic, so its relative error is that of the statistic times its logarithm.
 fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &mut Vec<String>) {
     match (one, other) {
         (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
@@ -42,7 +43,7 @@ fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &m
     }
 }
 
-/// Differences of the report `of_page`, a file, from that of the command with these arguments.
+/// Differences of the report in the file `of_page` from that of the command with these arguments.
 pub(crate) fn differences_from_command(arguments: &[String], of_page: &Path, tolerance: f64) -> Vec<String> {
     let of_command = of_page.with_extension("command.json");
     let output = Command::new(host_sim()).args(arguments).arg("--quiet").arg("-o").arg(&of_command).output();
@@ -54,7 +55,7 @@ pub(crate) fn differences_from_command(arguments: &[String], of_page: &Path, tol
     found
 }
 
-/// Ten files of as many formats, of which one has effects, and a simulation.
+/// The cases are ten files of different formats, one of which has effects, and a simulation.
 #[test]
 fn the_page_makes_the_report_of_the_command() {
     const TEST: &str = "same_report::the_page_makes_the_report_of_the_command";
@@ -80,7 +81,7 @@ fn the_page_makes_the_report_of_the_command() {
         "imu.bin",
     ];
     let mut files: Vec<(PathBuf, Vec<String>)> = names.into_iter().map(known).collect();
-    // A line and a temperature effect, in the program's own format, compressed.
+    // The file has a line and a temperature effect, in the program's own format, compressed.
     let counts = folder.path().join("effects.csv.gz");
     let effects = [
         "--effect",

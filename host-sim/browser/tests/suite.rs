@@ -1,5 +1,5 @@
-//! The page in headless Chromium, with the files of other programs and the command `imunoise`. Where there is no Chromium or no Node.js the
-//! tests are reported as skipped.
+//! The page in headless Chromium, with the files of other programs and the command `imunoise`. Without Chromium or Node.js the tests are
+//! reported as skipped.
 
 mod harness;
 mod live;

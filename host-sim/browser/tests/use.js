@@ -1,5 +1,5 @@
-// node use.js CHROMIUM URL FOLDER <FILES: a user's way through the page, from a disk and from a server. FILES names recordings. What is
-// compared with the command is written into FOLDER.
+// node use.js CHROMIUM URL FOLDER <FILES: uses the page as a user does, loaded from a disk and from a server. FILES names recordings.
+// FOLDER gets the files that the caller compares with those of the program.
 "use strict";
 const assert = require("node:assert");
 const fs = require("node:fs");
@@ -15,7 +15,7 @@ const text = (id) => `document.getElementById("${id}").innerText`;
 const isShown = (id) => `!document.getElementById("${id}").hidden`;
 const simulate = (seconds) => `document.querySelector("#simulate [name=seconds]").value = ${seconds};
   document.getElementById("simulate").requestSubmit()`;
-// The directive of the page's policy that refuses a request.
+// Resolves to the directive of the page's policy that refuses the request of `act`.
 const refused = (act) => `new Promise((resolve) => {
   document.addEventListener("securitypolicyviolation", (event) => resolve(event.effectiveDirective), { once: true });
   ${act};
@@ -35,7 +35,7 @@ const fromDisk = (page) => (async () => {
   page.errors = [];
   page.requests = page.requests.filter((request) => !request.includes("example.org"));
 
-  // Each format is recognised; a damaged file is one sentence and leaves the others.
+  // Each format is recognised. A damaged file gives an error of one line, and the other files are shown.
   await page.drop([files.csv, files.npy, files.ulog, files.bag, files.damaged]);
   const cards = await page.value('[...document.querySelectorAll("#inspected > section")].map((card) => card.innerText)');
   const kinds = ["text", "NumPy", "PX4", "ROS 1"];
@@ -45,7 +45,7 @@ const fromDisk = (page) => (async () => {
   assert.ok(error.includes(path.basename(files.damaged)) && !error.includes("\n"), error);
   await looks(page, "inspected");
 
-  // The keyboard alone: from the beginning of the page to the first recording's report.
+  // The keyboard alone leads from the beginning of the page to the report of the first recording.
   await page.choose([files.csv]);
   await page.value("document.activeElement.blur()");
   const reached = [];
@@ -63,7 +63,7 @@ const fromDisk = (page) => (async () => {
   assert.equal(await page.value("document.activeElement.id"), "result");
   const inFrame = 'document.getElementById("frame").contentDocument';
   await page.until(`${inFrame}.querySelectorAll("figure svg").length > 3`);
-  // The script of the report runs: it makes the button that saves figures and tables.
+  // The script of the report has run if there is the button that saves figures and tables.
   await page.until(`[...${inFrame}.querySelectorAll("button")].some((button) => button.textContent === "Save")`);
   await page.until(`document.getElementById("frame").clientHeight >= ${inFrame}.body.scrollHeight`);
   await looks(page, "report");
@@ -72,7 +72,7 @@ const fromDisk = (page) => (async () => {
   assert.ok(fs.readFileSync(path.join(folder, saved), "utf8").startsWith("<!DOCTYPE html>"));
   const formats = await page.value('[...document.querySelectorAll("#export [name=format] option")].map((option) => option.value)');
   assert.ok(formats.length >= 10);
-  // A browser takes ten downloads from a page before it asks.
+  // A browser accepts ten downloads from a page before it asks the user.
   for (const format of [formats[0], ...formats.slice(-3)]) {
     await page.value(`document.querySelector("#export [name=format]").value = "${format}"`);
     const exported = await page.download(() => page.value('document.getElementById("export").requestSubmit()'));
@@ -80,7 +80,7 @@ const fromDisk = (page) => (async () => {
     await page.idle();
   }
 
-  // Several recordings.
+  // Several recordings are compared.
   await page.choose(files.compared);
   await page.click("#compare");
   await page.until(isShown("comparison"));
@@ -88,7 +88,7 @@ const fromDisk = (page) => (async () => {
   fs.writeFileSync(path.join(folder, "agreement.txt"), await page.value('document.getElementById("agreement").textContent'));
   await looks(page, "comparison");
 
-  // A day of simulation is cancelled when it has begun; the next one is not.
+  // The simulation of a day is cancelled after its begin. The next simulation succeeds.
   await page.value(simulate(86_400));
   await page.until(`${text("status")}.includes("simulating") && document.getElementById("progress").value > 0`);
   await looks(page, "progress");

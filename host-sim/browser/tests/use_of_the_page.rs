@@ -1,11 +1,11 @@
-//! A user's way through the page.
+//! The steps of a user on the page.
 
 use crate::harness::drive;
 use serde_json::json;
 use std::process::Command;
 use system_tests::{host_sim, recorded_samples};
 
-/// `use.js` says what is looked at; exports and the comparison of several files are those of the command.
+/// `use.js` defines what is checked. Exports and the comparison of several files equal those of the command.
 #[test]
 fn a_user_finds_the_way_and_nothing_is_requested() {
     const TEST: &str = "use_of_the_page::a_user_finds_the_way_and_nothing_is_requested";

@@ -12,28 +12,28 @@ const INTERNAL_RATE_HZ: f64 = 819.2;
 /// Time base of the sample period, Hz; the slow one is 31 of its periods.
 const TIME_BASE_HZ: f64 = 1638.4;
 const SLOW_TIME_BASE: u32 = 31;
-/// Initial bias error (1 σ): deg/s, g.
+/// Initial bias errors (1 σ): of gyroscopes in deg/s, of accelerometers in g.
 const GYRO_BIAS: f64 = 3.0;
 const ACCELEROMETER_BIAS: f64 = 0.05;
 const ACCELEROMETER_LSB: f64 = 3.33e-3;
 const MAGNETOMETER_LSB: f64 = 0.5e-3;
 /// Largest count of a 14-bit register.
 const FULL_SCALE_COUNTS: f64 = 8191.0;
-/// 2 °/√h; 0.007 °/s.
+/// Noise of a gyroscope: 2 °/√h; 0.007 °/s.
 const GYRO_NOISE: DataSheetNoise = DataSheetNoise {
     angle_random_walk: Some(2.0 / 60.0),
     in_run_bias_stability: Some(0.007),
     rate_random_walk: None,
     curve: &GYRO_CURVE,
 };
-/// 0.2 m/s/√h in g·√s; 0.2 mg.
+/// Noise of an accelerometer: 0.2 m/s/√h in g·√s; 0.2 mg.
 const ACCELEROMETER_NOISE: DataSheetNoise = DataSheetNoise {
     angle_random_walk: Some(0.2 / 60.0 / 9.806_65),
     in_run_bias_stability: Some(0.2e-3),
     rate_random_walk: None,
     curve: &ACCELEROMETER_CURVE,
 };
-/// 0.066 mgauss/√Hz.
+/// Noise of a magnetometer: 0.066 mgauss/√Hz.
 const MAGNETOMETER_NOISE: DataSheetNoise = DataSheetNoise {
     angle_random_walk: Some(0.066e-3),
     in_run_bias_stability: None,
@@ -45,7 +45,7 @@ const fn deviation(tau_s: f64, mean: f64, low: f64, high: f64) -> DataSheetDevia
     DataSheetDeviation { tau_s, mean, low, high }
 }
 
-/// Figure 7, page 9: mean and ±1 σ over parts, °/s, at the corners of the drawn lines.
+/// Curve of Figure 7, page 9: mean and ±1 σ over parts, °/s, at the corners of the drawn lines.
 const GYRO_CURVE: [DataSheetDeviation; 18] = [
     deviation(0.1, 0.0937, 0.0879, 0.099),
     deviation(1.0, 0.0312, 0.0292, 0.033),
@@ -66,7 +66,7 @@ const GYRO_CURVE: [DataSheetDeviation; 18] = [
     deviation(1000.0, 0.00699, 0.00456, 0.00948),
     deviation(2000.0, 0.0082, 0.00431, 0.0122),
 ];
-/// Figure 8, page 9: mean and ±1 σ over parts, g; the mean has no corner from 3 to 9 s.
+/// Curve of Figure 8, page 9: mean and ±1 σ over parts, g. The mean has no corner from 3 to 9 s.
 const ACCELEROMETER_CURVE: [DataSheetDeviation; 17] = [
     deviation(0.1, 912.0e-6, 856.0e-6, 974.0e-6),
     deviation(1.0, 351.0e-6, 311.0e-6, 393.0e-6),
@@ -86,7 +86,7 @@ const ACCELEROMETER_CURVE: [DataSheetDeviation; 17] = [
     deviation(1000.0, 271.0e-6, 189.0e-6, 351.0e-6),
     deviation(2000.0, 278.0e-6, 213.0e-6, 342.0e-6),
 ];
-/// 0.01 °/s/°C, 0.32 °/s/V, 0.05 °/s/g.
+/// Sensitivities of a gyroscope: 0.01 °/s/°C, 0.32 °/s/V, 0.05 °/s/g.
 const GYRO_SENSITIVITIES: DataSheetSensitivities =
     DataSheetSensitivities { temperature: Some(0.01), supply: Some(0.32), specific_force: Some(0.05) };
 /// Name of the part.
@@ -108,7 +108,7 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         data_sheet: DataSheetNoise::default(),
         sensitivities: DataSheetSensitivities::default(),
     };
-    // The range of 14 bits, not the specified one.
+    // The full scale is the range of 14 bits, not the specified range.
     let full_scale = |lsb: f64| Some(lsb * FULL_SCALE_COUNTS);
     let gyro = |name, axis| ChannelProfile {
         range: full_scale(gyro_lsb),
@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    /// They differ by at most a sixth, as in the sheet.
+    /// The curves and the stated noise differ by at most a sixth, as in the data sheet.
     #[test]
     fn the_drawn_curves_are_those_of_the_stated_noise() {
         let profile = profile(0.05);
@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    /// Every 8.192th value; 2 × 4 taps reach over 7, so samples do not correlate.
+    /// At 100 Hz every 8.192th value is read; 2 × 4 taps reach over 7 values, so samples are uncorrelated.
     #[test]
     fn filters_are_read_at_the_rate_of_the_recording() {
         let profile = profile(0.05);

@@ -8,16 +8,16 @@ use std::ops::Range;
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingDescription {
     pub profile: SensorProfile,
-    /// Sample rate in Hz, as the user states it or as the time stamps show it.
+    /// Sample rate in Hz, stated by the user or derived from the time stamps.
     pub sample_rate_hz: f64,
     pub samples: u64,
     /// Sample periods from the first to the last sample, inclusive.
     pub periods: u64,
-    /// The channels that were recorded, in the order of the sensor's burst.
+    /// The recorded channels, in the order of the sensor's burst.
     pub channels: Vec<ChannelProfile>,
-    /// As [`Measurement::dropped`].
+    /// Samples that are missing or were refused, by cause: see [`Measurement::dropped`].
     pub dropped: BTreeMap<&'static str, u64>,
-    /// As [`Measurement::flagged`].
+    /// Samples that are used although a warning was raised, by cause: see [`Measurement::flagged`].
     pub flagged: BTreeMap<&'static str, u64>,
 }
 
@@ -28,7 +28,7 @@ impl RecordingDescription {
         1.0 / self.sample_rate_hz
     }
 
-    /// As [`Measurement::middle`].
+    /// First sample period of the second half by time.
     #[must_use]
     pub fn middle(&self) -> u64 {
         self.periods / 2
@@ -52,14 +52,15 @@ impl From<&Measurement> for RecordingDescription {
 /// Consecutive usable samples of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SampleBlock {
-    /// Sample period of each, from the recording's first sample; strictly increasing.
+    /// Sample period of each sample, counted from the recording's first sample; strictly increasing.
     pub slots: Vec<u64>,
-    /// In the order of [`RecordingDescription::channels`]; positions of refused samples are those in the block.
+    /// The channels, in the order of [`RecordingDescription::channels`]. Positions of refused samples count from the
+    /// block's begin.
     pub channels: Vec<MeasuredChannel>,
 }
 
 impl SampleBlock {
-    /// Some of its samples.
+    /// The samples of the block at these positions.
     #[must_use]
     pub fn part(&self, positions: Range<usize>) -> Self {
         let channels = self.channels.iter().map(|channel| channel.part(positions.clone())).collect();
@@ -68,7 +69,7 @@ impl SampleBlock {
 }
 
 impl Measurement {
-    /// Blocks of `rows` samples; the last may be shorter.
+    /// The recording in blocks of `rows` samples; the last block may be shorter.
     pub fn blocks(&self, rows: usize) -> impl Iterator<Item = SampleBlock> {
         (0..self.len()).step_by(rows).map(move |from| {
             let positions = from..(from + rows).min(self.len());

@@ -21,7 +21,7 @@ impl ChannelId {
 pub struct PerChannel<T>(Vec<T>);
 
 impl<T> PerChannel<T> {
-    /// The channels.
+    /// The identifiers of the channels.
     pub fn ids(&self) -> impl DoubleEndedIterator<Item = ChannelId> + Clone + use<T> {
         (0..self.0.len()).map(ChannelId)
     }
@@ -31,12 +31,12 @@ impl<T> PerChannel<T> {
         self.0.iter()
     }
 
-    /// The values, to change them.
+    /// The values, for changes.
     pub fn iter_mut(&mut self) -> slice::IterMut<'_, T> {
         self.0.iter_mut()
     }
 
-    /// The values in the order of the channels, to change them.
+    /// The values in the order of the channels, for changes.
     pub fn as_mut_slice(&mut self) -> &mut [T] {
         &mut self.0
     }
@@ -46,13 +46,13 @@ impl<T> PerChannel<T> {
         self.ids().zip(&self.0)
     }
 
-    /// The values alone.
+    /// The values without the channels.
     #[must_use]
     pub fn into_vec(self) -> Vec<T> {
         self.0
     }
 
-    /// The results of `of`, by channel.
+    /// The results of `of` for each value, by channel.
     #[must_use]
     pub fn map<U>(&self, of: impl FnMut(&T) -> U) -> PerChannel<U> {
         self.0.iter().map(of).collect()

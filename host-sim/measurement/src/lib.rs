@@ -24,15 +24,15 @@ use std::ops::Range;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     pub profile: SensorProfile,
-    /// Sample rate in Hz, as the user states it or as the time stamps show it.
+    /// Sample rate in Hz, stated by the user or derived from the time stamps.
     pub sample_rate_hz: f64,
     /// Sample rate in Hz that the user states, if any.
     pub stated_rate_hz: Option<f64>,
-    /// Sample period of each sample, from the first; strictly increasing, with gaps as steps above 1.
+    /// Sample period of each sample, counted from the first; strictly increasing, with a step above 1 at a gap.
     pub slots: Vec<u64>,
     /// Time stamps, s, if every sample has one.
     pub times_s: Option<Vec<f64>>,
-    /// The channels that were recorded, in the order of the sensor's burst.
+    /// The recorded channels, in the order of the sensor's burst.
     pub channels: Vec<MeasuredChannel>,
     /// Samples that are missing or were refused, by cause; `gap` counts those that never arrived.
     pub dropped: BTreeMap<&'static str, u64>,
@@ -44,9 +44,9 @@ pub struct Measurement {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredChannel {
     pub profile: ChannelProfile,
-    /// A register count per slot; meaningless if refused.
+    /// One register count per slot; meaningless for a refused sample.
     pub counts: Vec<i32>,
-    /// Refused samples of this channel alone: positions in `counts`, ascending, by cause.
+    /// Positions in `counts` of samples refused in this channel alone, ascending, by cause.
     pub refused: BTreeMap<&'static str, Vec<usize>>,
 }
 
@@ -57,7 +57,7 @@ impl MeasuredChannel {
         Self { profile, counts, refused: BTreeMap::new() }
     }
 
-    /// In ascending order.
+    /// Positions of refused samples, ascending.
     #[must_use]
     pub fn refused_positions(&self) -> Vec<usize> {
         let mut positions: Vec<usize> = self.refused.values().flatten().copied().collect();
@@ -66,14 +66,14 @@ impl MeasuredChannel {
         positions
     }
 
-    /// Sample period and count of each sample that is not refused; `slots` are those of all.
+    /// Sample period and count of each sample that is not refused; `slots` are the sample periods of all samples.
     pub fn used_samples<'a>(&'a self, slots: &'a [u64]) -> impl Iterator<Item = (u64, i32)> + 'a {
         let mut refused = self.refused_positions().into_iter().peekable();
         let samples = slots.iter().copied().zip(self.counts.iter().copied()).enumerate();
         samples.filter_map(move |(position, sample)| refused.next_if_eq(&position).is_none().then_some(sample))
     }
 
-    /// The samples at some positions.
+    /// The samples of the channel at these positions.
     #[must_use]
     pub fn part(&self, positions: Range<usize>) -> Self {
         let within = |of: &[usize]| -> Vec<usize> {
@@ -89,14 +89,14 @@ impl MeasuredChannel {
         }
     }
 
-    /// True if refused for any cause.
+    /// True if the sample at `position` is refused for any cause.
     #[must_use]
     pub fn is_refused(&self, position: usize) -> bool {
         self.refused.values().any(|positions| positions.binary_search(&position).is_ok())
     }
 }
 
-/// Missing part of `samples` in `periods` sample periods; 0 without a period.
+/// Missing fraction of a record with `samples` samples in `periods` sample periods, 0 to 1; 0 without a period.
 #[must_use]
 pub fn lost_part(samples: u64, periods: u64) -> f64 {
     periods.saturating_sub(samples) as f64 / periods.max(1) as f64
@@ -134,7 +134,7 @@ impl Measurement {
         self.periods() / 2
     }
 
-    /// The recording as if it had ended before the sample period `slot`, with its share of samples that never arrived.
+    /// The recording cut off before the sample period `slot`, with its share of samples that never arrived.
     #[must_use]
     pub fn before(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);
@@ -180,7 +180,7 @@ impl Measurement {
         self.channels.iter().map(|channel| channel.profile)
     }
 
-    /// `None` if it was not recorded.
+    /// The channel of this profile; `None` if it was not recorded.
     #[must_use]
     pub fn channel(&self, profile: &ChannelProfile) -> Option<&MeasuredChannel> {
         self.channels.iter().find(|channel| channel.profile.name == profile.name)

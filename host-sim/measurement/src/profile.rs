@@ -3,17 +3,19 @@
 use allan_core::term::MovingAverageFilter;
 use serde::{Deserialize, Serialize};
 
-/// Relative standard deviation of the clock of an ordinary host: a crystal that is not trimmed, 20 ppm.
+/// Relative standard deviation of the clock of an ordinary host: 20 ppm, as of an untrimmed crystal.
 pub const HOST_CLOCK_ERROR: f64 = 20e-6;
-/// Relative standard deviation of the sample rate: by the clock of a host whose crystal is good to ±100 ppm (2 σ).
+/// Relative standard deviation of the sample rate, by the clock of a host whose crystal is within ±100 ppm (2 σ).
 pub(crate) const SAMPLE_RATE_ERROR: f64 = 5e-5;
-/// Largest factor on a typical sensitivity: single parts reach 10, and none is known at √10·10.
+/// Largest factor on a typical sensitivity: single parts reach 10, and none is known to reach √10·10.
 pub(crate) const LARGEST_SENSITIVITY_MULTIPLE: f64 = 31.622_776_601_683_79;
-/// Largest variance of rounded noise of 0.45 counts, halfway between two counts; larger noise is rounded as if white.
+/// Largest Allan variance of rounded noise of 0.45 counts, with its mean halfway between two counts. The rounding of
+/// larger noise is white.
 pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.3;
-/// Ratio of nominal clock to sample rate up to which both may be one clock: oscillators are off by percents.
+/// Ratio of nominal clock to sample rate up to which both may be one clock, since oscillators have errors of some
+/// percent.
 const SAME_CLOCK: f64 = 1.1;
-/// Relative distance from a whole ratio of the clocks of sensor and reader.
+/// Largest relative deviation of the clocks of sensor and reader from an integer ratio.
 const WHOLE: f64 = 0.01;
 
 /// Physical quantity that a channel measures.
@@ -28,7 +30,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them.
+    /// All quantities.
     pub const ALL: [Self; 6] = [
         Self::AngularRate,
         Self::SpecificForce,
@@ -51,7 +53,7 @@ impl Quantity {
         }
     }
 
-    /// The unit in which it is analysed.
+    /// The unit in which the quantity is analysed.
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
@@ -63,13 +65,13 @@ impl Quantity {
         }
     }
 
-    /// Gyroscopes and accelerometers.
+    /// True for angular rate and specific force.
     #[must_use]
     pub fn is_inertial(self) -> bool {
         matches!(self, Self::AngularRate | Self::SpecificForce)
     }
 
-    /// Temperature and supply, which other channels may follow.
+    /// True for temperature and supply, on which other channels may depend.
     #[must_use]
     pub fn is_environment(self) -> bool {
         matches!(self, Self::Temperature | Self::SupplyVoltage)
@@ -88,7 +90,7 @@ pub struct ChannelProfile {
     pub unit: &'static str,
     /// Size of one count, in `unit`.
     pub lsb: f64,
-    /// 1 σ over parts, in `unit`; `None` if unknown.
+    /// Initial bias error, 1 σ over parts, in `unit`; `None` if unknown.
     pub initial_bias_error: Option<f64>,
     /// Largest magnitude, in `unit`; `None` if unknown.
     pub range: Option<f64>,
@@ -97,7 +99,7 @@ pub struct ChannelProfile {
 }
 
 impl ChannelProfile {
-    /// Name and quantity alone: counts of 1 unit, the axis by the name's end.
+    /// A channel with only a name and a quantity: counts of 1 unit, the axis by the end of the name.
     #[must_use]
     pub fn generic(name: &'static str, quantity: Quantity) -> Self {
         let axis = ["x", "y", "z"].into_iter().find(|axis| name.rsplit('_').next() == Some(axis));
@@ -141,16 +143,16 @@ pub struct DataSheetDeviation {
 /// Magnitudes of typical sensitivities by the data sheet; `None` if not stated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DataSheetSensitivities {
-    /// To temperature, in the channel's unit per °C.
+    /// Sensitivity to temperature, in the channel's unit per °C.
     pub temperature: Option<f64>,
-    /// To the supply voltage, in the channel's unit per V.
+    /// Sensitivity to the supply voltage, in the channel's unit per V.
     pub supply: Option<f64>,
-    /// For a gyroscope to specific force, in the channel's unit per g.
+    /// Sensitivity of a gyroscope to specific force, in the channel's unit per g.
     pub specific_force: Option<f64>,
 }
 
 impl DataSheetSensitivities {
-    /// To a measured quantity.
+    /// Sensitivity to a measured quantity.
     #[must_use]
     pub fn to(&self, quantity: Quantity) -> Option<f64> {
         match quantity {
@@ -174,15 +176,15 @@ pub struct SensorProfile {
     pub native_rates_hz: Vec<f64>,
     /// Possible low-pass filters of the sensor, all values read, the shortest first.
     pub filters: Vec<MovingAverageFilter>,
-    /// True if a second-order low-pass may take their place.
+    /// True if a second-order low-pass may replace these filters.
     pub may_be_low_pass: bool,
-    /// Allan variance at the shortest octaves, counts², above which rounding is white noise.
+    /// Allan variance at the shortest octaves, counts², above which the rounding is white noise.
     pub dithered_avar_counts2: f64,
     /// Largest plausible factor on a data sheet's sensitivity.
     pub largest_sensitivity_multiple: f64,
     /// Relative standard deviation of the clock of the host that stamps the samples.
     pub host_clock_error: f64,
-    /// Relative standard deviation of the sample rate, and so of a line's frequency.
+    /// Relative standard deviation of the sample rate, and so of the frequency of a line.
     pub sample_rate_error: f64,
 }
 
@@ -213,7 +215,7 @@ impl SensorProfile {
             native_rates_hz: Vec::new(),
             filters: taps().map(moving_average).chain(taps().map(MovingAverageFilter::bartlett)).collect(),
             may_be_low_pass: true,
-            // Independent of the sensor.
+            // These values do not depend on the sensor.
             dithered_avar_counts2: DITHERED_AVAR_COUNTS2,
             largest_sensitivity_multiple: LARGEST_SENSITIVITY_MULTIPLE,
             host_clock_error: HOST_CLOCK_ERROR,
@@ -227,7 +229,7 @@ impl SensorProfile {
         self.channels.iter().copied().find(|channel| channel.name == name)
     }
 
-    /// The filters in samples at `rate_hz`, every value read or one in `internal_rate_hz/rate_hz`.
+    /// The filters in samples at `rate_hz`, if every value is read or one of `internal_rate_hz/rate_hz`.
     #[must_use]
     pub fn filters_read_at(&self, rate_hz: f64) -> Vec<MovingAverageFilter> {
         let decimation = self.internal_rate_hz / rate_hz;
@@ -239,7 +241,7 @@ impl SensorProfile {
         self.filters.iter().copied().chain(slow).collect()
     }
 
-    /// Sensor values per sample of a reader at `rate_hz`; 1 unless whole to [`WHOLE`].
+    /// Sensor values per sample of a reader at `rate_hz`; 1 unless the ratio is an integer to [`WHOLE`].
     #[must_use]
     pub fn read_every(&self, rate_hz: f64) -> u32 {
         let decimation = self.internal_rate_hz / rate_hz;
@@ -247,7 +249,7 @@ impl SensorProfile {
         if is_whole { (decimation.round() as u32).max(1) } else { 1 }
     }
 
-    /// Hz; `None` if the profile names none.
+    /// The native rate nearest to `rate_hz`, Hz; `None` if the profile has no native rates.
     #[must_use]
     pub fn nearest_native_rate_hz(&self, rate_hz: f64) -> Option<f64> {
         let distance = |native: &f64| (native - rate_hz).abs();

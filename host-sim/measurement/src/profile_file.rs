@@ -1,4 +1,4 @@
-//! Sensor profiles from TOML files, included ones and others.
+//! Sensor profiles in TOML: included ones and files of the user.
 
 use crate::adis16405;
 use crate::profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
@@ -6,18 +6,18 @@ use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
-/// Name and file.
+/// Name and text of each included profile.
 const INCLUDED: [(&str, &str); 3] = [
     ("adis16470", include_str!("../profiles/adis16470.toml")),
     ("bmi088", include_str!("../profiles/bmi088.toml")),
     ("mpu6050", include_str!("../profiles/mpu6050.toml")),
 ];
 
-/// Name of the sensor whose register counts need no profile, and that of a sensor without a data sheet.
+/// Name of the sensor whose register counts need no profile, and the name for a sensor without a data sheet.
 const ADIS16405: &str = "adis16405";
 const GENERIC: &str = "generic";
 
-/// Why a profile cannot be used.
+/// The reason for which a profile cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileError {
     #[error("{0}")]
@@ -46,7 +46,7 @@ pub enum ProfileError {
 #[serde(deny_unknown_fields)]
 struct ProfileFile {
     name: String,
-    /// For the reader of the file.
+    /// A note for readers of the file.
     #[serde(rename = "source")]
     _source: String,
     internal_rate_hz: Option<f64>,
@@ -74,12 +74,12 @@ struct ChannelGroup {
     specific_force_sensitivity: Option<f64>,
 }
 
-/// Names by which a sensor is asked for.
+/// Names by which a user selects a sensor.
 pub fn sensor_names() -> impl Iterator<Item = &'static str> {
     [ADIS16405].into_iter().chain(INCLUDED.iter().map(|(name, _)| *name)).chain([GENERIC])
 }
 
-/// The profile of the sensor `name`, in any case; the gyros of an ADIS16405 have counts of `gyro_lsb` deg/s. `None` for other names.
+/// The profile of the sensor `name`, in upper or lower case. Counts of an ADIS16405's gyros are `gyro_lsb` deg/s. `None` for other names.
 #[must_use]
 pub fn by_name(name: &str, gyro_lsb: f64) -> Option<SensorProfile> {
     match name.to_lowercase().as_str() {
@@ -99,7 +99,7 @@ pub fn included(name: &str) -> Option<SensorProfile> {
 /// Reads a profile; names are kept until the program ends.
 ///
 /// # Errors
-/// The text is no TOML, a field is missing or unknown, or a value has no meaning.
+/// The text is not TOML, a field is missing or unknown, or a value is invalid.
 pub fn parse(text: &str) -> Result<SensorProfile, ProfileError> {
     let file: ProfileFile = toml::from_str(text).map_err(|error| {
         let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
@@ -182,7 +182,7 @@ fn positive(channel: &str, field: &'static str, value: f64) -> Result<(), Profil
     Err(ProfileError::NotPositive { channel: channel.to_owned(), field, value })
 }
 
-/// Leaks each distinct text once: profiles are `Copy`.
+/// Leaks each distinct text once, since profiles are `Copy`.
 fn intern(text: &str) -> &'static str {
     static KNOWN: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -198,8 +198,8 @@ fn intern(text: &str) -> &'static str {
 mod tests {
     use super::{by_name, included, parse, sensor_names};
 
-    /// ADIS16470 0.34 °/√h, 8 °/h, 100 µg/√Hz; BMI088 0.014 °/s/√Hz, 160 and 190 µg/√Hz; MPU-6050 0.005 °/s/√Hz, 400
-    /// µg/√Hz. N is 1/√2 of a one-sided density.
+    /// The data sheets state: ADIS16470 0.34 °/√h, 8 °/h, 100 µg/√Hz; BMI088 0.014 °/s/√Hz, 160 and 190 µg/√Hz;
+    /// MPU-6050 0.005 °/s/√Hz, 400 µg/√Hz. N is 1/√2 of a one-sided density.
     #[test]
     fn the_included_profiles_state_the_data_sheets() {
         let one_sided = std::f64::consts::FRAC_1_SQRT_2;
@@ -216,7 +216,7 @@ mod tests {
             let stated = profile.data_sheet.angle_random_walk.expect("stated");
             assert!((stated / noise - 1.0).abs() < 4e-4, "{name} {channel}: {stated} for {noise}");
         }
-        // Full scale of 16 bits; the ADIS16470 counts beyond.
+        // Full scale has 16 bits; the counts of the ADIS16470 go beyond.
         for (name, channel, counts) in
             [("bmi088", "accl_x", 32_768.0), ("bmi088", "gyro_x", 32_768.0), ("mpu6050", "accl_x", 32_768.0)]
         {
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn an_error_of_a_profile_names_its_cause() {
         let sensor = "name = \"A1\"\nsource = \"none\"\n";
         let channel = |unit: &str, lsb: &str, rest: &str| {
             format!(

@@ -1,6 +1,7 @@
-//! Repeated samples against chance equality.
+//! Distinguishes repeated samples from samples that are equal by chance.
 
-/// The fraction f of repeated samples: `all = f + (1 − f)·Π (share − f)/(1 − f)` for fractions of equal ones.
+/// The fraction f of repeated samples, the solution of `all = f + (1 − f)·Π (share − f)/(1 − f)`; `all` and `shares`
+/// are fractions of equal samples in all channels and in each.
 #[must_use]
 pub fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
     let (mut low, mut high) = (0.0, all);
@@ -16,7 +17,7 @@ pub fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
 mod tests {
     use super::repeated_fraction;
 
-    /// 0.3 by chance, and none or half read again.
+    /// A fraction of 0.3 is equal by chance, and none or half are read again.
     #[test]
     fn equal_samples_are_told_from_those_that_are_read_again() {
         let by_chance = 0.3_f64.powi(3);

@@ -1,5 +1,5 @@
-//! The bench: asks a device the checklist of docs/bench.md and says what passes, what fails, and what is probably wrong. Pages and tables are
-//! those of the ADIS16400/ADIS16405 data sheet, Rev. B.
+//! The bench: works through the checklist of docs/bench.md on a device, and states which checks pass or fail and the probable cause. Pages
+//! and tables are those of the ADIS16400/ADIS16405 data sheet, Rev. B.
 
 mod transcript;
 mod verdicts;
@@ -12,16 +12,16 @@ use transcript::Topic;
 pub use transcript::{BenchPlan, Step, Transcript};
 pub use verdicts::{Cause, Check, checks};
 
-/// Pause after a command that restores a setting, s: the device takes some bytes at a time.
+/// Pause after a command that restores a setting, s, since the device accepts a few bytes at a time.
 pub const SETTING_S: f64 = 0.5;
 
-/// The steps one after the other. The caller sends the commands, and hands over what the device answers.
+/// The run of the steps. The caller sends the commands, and passes on the answers of the device.
 #[derive(Debug)]
 pub struct BenchRun {
     steps: Vec<Step>,
-    /// Position of the step after the one under way.
+    /// Position of the step after the current one.
     next: usize,
-    /// The step under way, and what was received since its command.
+    /// The current step, and what was received since its command.
     under_way: Option<(Step, Vec<Received>)>,
     transcript: Transcript,
     /// Counters of the decoder before the first step.
@@ -29,20 +29,20 @@ pub struct BenchRun {
 }
 
 impl BenchRun {
-    /// Before its first step, with the counters of a decoder that may have received something already.
+    /// A run before its first step, with the counters of a decoder that may have received something already.
     #[must_use]
     pub fn new(plan: &BenchPlan, before: DecoderCounters) -> Self {
         Self { steps: plan.steps(), next: 0, under_way: None, transcript: Transcript::default(), before }
     }
 
-    /// Number of the steps.
+    /// Number of steps.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.steps.len()
     }
 
-    /// Ends the step under way and begins the next one: its position, and the step, whose command is to be sent. `None` where none is left
-    /// to be asked.
+    /// Ends the current step and starts the next one. Returns its position and the step, whose command is to be sent; `None` if no step is
+    /// left.
     pub fn begin_step(&mut self) -> Option<(usize, Step)> {
         if let Some((step, received)) = self.under_way.take() {
             self.transcript.push(&step, received);
@@ -62,7 +62,7 @@ impl BenchRun {
         }
     }
 
-    /// Takes what was received; whether the answer to the step under way is whole.
+    /// Adds what was received. True if the answer to the current step is complete.
     pub fn take(&mut self, received: Received) -> bool {
         let Some((step, answer)) = &mut self.under_way else { return false };
         let is_last = step.is_answered_by(&received);
@@ -70,12 +70,12 @@ impl BenchRun {
         is_last
     }
 
-    /// States the messages of a second port while the bursts were counted.
+    /// Sets the messages of a second port while the bursts were counted.
     pub fn set_second_port(&mut self, received: Option<Vec<Received>>) {
         self.transcript.second_port = received;
     }
 
-    /// All answers, and what the decoder has counted meanwhile; `after` are its counters now.
+    /// Returns all answers, and the decoder's counts during the run; `after` are its counters now.
     #[must_use]
     pub fn finish(mut self, after: DecoderCounters) -> Transcript {
         let before = self.before;
@@ -91,7 +91,7 @@ impl BenchRun {
     }
 }
 
-/// Writes a row for each check, and then what is probably wrong.
+/// Writes a row for each check, and then the probable causes of failures.
 ///
 /// # Errors
 /// `out` cannot be written.

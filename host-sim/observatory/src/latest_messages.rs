@@ -1,4 +1,4 @@
-//! The reports of a device as the live view, in the words of the host's reports.
+//! The live view of a device from its messages, in the words of the host's reports.
 
 use crate::message_text;
 use adis16405_driver::{Channel, GyroRange};
@@ -24,33 +24,33 @@ use reports::summary::{ChannelCoefficients, tables_of_channels};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Two lines of different channels whose frequencies differ by less than this share are one finding, as in the device's table.
+/// Relative difference of frequencies below which two lines of different channels are one finding, as in the device's table.
 const SAME_FREQUENCY: f64 = 0.02;
 
-/// The latest messages, those on channels by the channel's position in the burst.
+/// The latest messages; those about channels by the channel's position in the burst.
 #[derive(Debug, Default)]
 pub struct LatestMessages {
-    /// How the port is called.
+    /// Name of the port.
     name: String,
     hello: Option<Hello>,
     health: Option<Health>,
     channels: BTreeMap<u8, ChannelMessage>,
     learned: BTreeMap<u8, LearnedMessage>,
     validations: BTreeMap<u8, ValidationMessage>,
-    /// The last line of text.
+    /// The latest line of text.
     text: String,
-    /// Why the sensor is not sampled.
+    /// The reason for which the sensor is not sampled.
     trouble: Option<String>,
 }
 
 impl LatestMessages {
-    /// None, of the device on the port `name`.
+    /// No messages yet, of the device on the port `name`.
     #[must_use]
     pub fn new(name: String) -> Self {
         Self { name, ..Self::default() }
     }
 
-    /// Takes what was received.
+    /// Takes a received message or line.
     pub fn take(&mut self, received: Received) {
         let message = match received {
             Received::Text(line) => return self.take_text(&line),
@@ -81,7 +81,7 @@ impl LatestMessages {
         }
     }
 
-    /// The live view after a time without a message, with the counters of the decoder.
+    /// The live view after `silence` without a message, with the counters of the decoder.
     #[must_use]
     pub fn view(&self, silence: Duration, link: &DecoderCounters) -> LiveView {
         let (mut view, name) = (self.report(), &self.name);
@@ -172,7 +172,7 @@ impl LatestMessages {
         self.channels.values().filter_map(inertial).collect()
     }
 
-    /// Terms beyond N, B and K, of channels sampled every `period_s` s; those of several channels are one finding.
+    /// Terms beyond N, B and K of channels sampled every `period_s` s. Equal terms of several channels are one finding.
     fn findings(&self, period_s: f64) -> Vec<Finding> {
         let mut findings: Vec<Finding> = Vec::new();
         for report in self.learned.values() {
@@ -202,7 +202,7 @@ fn channel_at(position: u8) -> Option<Channel> {
     Channel::ALL.get(usize::from(position)).copied()
 }
 
-/// The sample rate with which a report was made.
+/// The sample rate that a report uses.
 fn rate_hz(hello: &Hello) -> f64 {
     hello.measured_rate_hz.unwrap_or(hello.sample_rate_hz)
 }
@@ -242,7 +242,7 @@ fn of_regressor(channel: Channel, regressor: &ReportedRegressor) -> Option<Effec
     }
 }
 
-/// The effect of a term that was added to the model of a channel which is sampled every `period_s` s.
+/// The effect of a term in the model of a channel that is sampled every `period_s` s.
 fn of_term(channel: Channel, added: &ReportedAddedTerm, period_s: f64) -> Option<Effect> {
     let of = &added.coefficient;
     let size = BoundedEstimate::new(of.value, of.low, of.high).in_unit(channel.unit());
@@ -289,7 +289,7 @@ fn of_term(channel: Channel, added: &ReportedAddedTerm, period_s: f64) -> Option
     })
 }
 
-/// True for effects of one cause: the part's filter, or lines at one frequency.
+/// True if two effects have one cause: the part's filter, or lines at one frequency.
 fn is_shared(one: &Effect, other: &Effect) -> bool {
     let is_near =
         |one: BoundedEstimate, other: BoundedEstimate| (one.value - other.value).abs() <= SAME_FREQUENCY * one.value;
@@ -309,7 +309,7 @@ mod tests {
     use ratatui::backend::TestBackend;
     use reports::live::CurveGroup;
 
-    /// Nothing for a quarter of a minute, and what the device says of its sensor, are the headline; a sensor that is found ends that.
+    /// Silence of a quarter of a minute, or what the device reports about a lost sensor, is the headline until the sensor is found.
     #[test]
     fn silence_and_a_lost_sensor_are_the_headline() {
         let mut messages = LatestMessages { name: "/dev/ttyACM0".to_owned(), ..LatestMessages::default() };
@@ -332,7 +332,7 @@ mod tests {
     const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4-mixed-alarm.bin");
     const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-    /// The message, one on a channel as that of gyro x, whose samples and losses are shown.
+    /// Decodes a message; one about a channel is made that of gyro x, whose samples and losses are shown.
     fn received(body: &[u8]) -> Option<Received> {
         let content = [body, &CRC.checksum(body).to_le_bytes()].concat();
         let mut decoder = Decoder::new();
@@ -344,8 +344,8 @@ mod tests {
         received
     }
 
-    /// A number of a device may be none, and an integer as large as it can be: at every place of every message eight bytes are replaced by
-    /// such a number, or an integer of any length by the largest (LEB128), with the checksum that belongs to them.
+    /// A device may send any number, including NaN, and the largest integers. At every place of every message, eight bytes are replaced by
+    /// such a number, or an integer of any length by the largest one (LEB128), with a matching checksum.
     #[test]
     fn any_number_of_a_device_is_shown() {
         let bodies = KEPT.split(|byte| *byte == 0).filter(|frame| !frame.is_empty()).map(|frame| {
@@ -375,7 +375,7 @@ mod tests {
                     }
                     let view = messages.view(Duration::ZERO, &DecoderCounters::default());
                     taken += 1;
-                    // Drawing costs a hundred times as much.
+                    // Drawing is a hundred times as slow, so not every view is drawn.
                     if taken % 16 == 0 {
                         drawn += 1;
                         terminal.draw(|frame| view.draw(frame, CurveGroup::default(), false)).expect("a frame");

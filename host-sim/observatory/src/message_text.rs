@@ -9,13 +9,13 @@ use link::{
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Silence after which it is said that nothing comes: a device reports every ten seconds.
+/// Silence after which a note is shown, since a device reports every ten seconds.
 pub const LONG_SILENCE: Duration = Duration::from_secs(15);
 
-/// Causes of a long silence.
+/// Probable causes of a long silence.
 pub const SILENCE: &str = "another port or baud rate, no image on the board, or its reports are off; try `bench`";
 
-/// Numbers of messages received, missing and damaged, in one line.
+/// The numbers of received, missing and damaged messages, in one line.
 #[must_use]
 pub fn summary(counters: &DecoderCounters) -> String {
     let DecoderCounters { frames, lines, bad_frames, other_version, missing, discarded_bytes } = counters;
@@ -25,7 +25,7 @@ pub fn summary(counters: &DecoderCounters) -> String {
     )
 }
 
-/// Turns messages into text, and keeps what later messages refer to.
+/// Turns messages into text, and keeps what later messages need.
 #[derive(Debug, Default)]
 pub struct MessageFormatter {
     sample_rate_hz: Option<f64>,
@@ -35,7 +35,7 @@ pub struct MessageFormatter {
 }
 
 impl MessageFormatter {
-    /// The lines of a message or of a line of plain text.
+    /// The lines of a message, or a line of plain text.
     pub fn lines(&mut self, received: &Received) -> Vec<String> {
         let message = match received {
             Received::Text(line) => return vec![line.as_str().to_owned()],
@@ -82,7 +82,7 @@ impl MessageFormatter {
     }
 }
 
-/// The channel at `position` in the burst with its value in its unit; `None` for a position that has no channel.
+/// The channel at `position` in the burst, and its value in its unit; `None` if the position has no channel.
 fn sample(burst: &RawBurst, position: u8, range: GyroRange) -> Option<(Channel, f64)> {
     let channel = *Channel::ALL.get(usize::from(position))?;
     let word = OutputWord(u16::from_be_bytes(burst.words[usize::from(position)]));
@@ -153,7 +153,7 @@ fn name(channel: u8) -> &'static str {
     Channel::ALL.get(usize::from(channel)).map_or("unknown channel", |channel| channel.name())
 }
 
-/// Use of the bursts, every counter that is not 0, and the load of the processor, in one line.
+/// The use of the bursts, every counter that is not 0, and the load of the processor, in one line.
 #[must_use]
 pub fn health_text(health: &Health) -> String {
     let counters = [
@@ -263,7 +263,7 @@ fn effect(effect: &ReportedAddedTerm) -> String {
     text + &format!("; {percent:+.1} % at n = {n} ({sigmas:.0} sigma), score {:.0}", effect.score)
 }
 
-/// Errors on this epoch without and with the model and the regression of the epoch before.
+/// Errors on this epoch, without and with the model and the regression of the previous epoch.
 fn checked(report: &ValidationMessage, sample_rate_hz: Option<f64>) -> String {
     let mut text = format!("   {}, epoch {}, unseen:", name(report.channel), report.epoch);
     let points = |error: Option<ReportedModelError>| {

@@ -1,4 +1,4 @@
-//! An open recording of any format: its samples, and from them its report.
+//! An open recording of any format: its samples, and their report.
 
 use crate::streaming;
 use adis16405_driver::GyroRange;
@@ -19,32 +19,32 @@ use reports::summary::longest_at_rest;
 use simulation::Replay;
 use std::path::Path;
 
-/// Recordings that are not condensed for their analysis.
+/// Size up to which recordings are not condensed for the analysis.
 pub const KEPT: KeptInMemory =
     KeptInMemory { rows: MOST_SAMPLES, rows_with_losses: MOST_SAMPLES_WITH_LOSSES, most_lost: MOST_LOST };
-/// The command, which reads a recording again with the options that a report states.
+/// The command that a report states for reading its recording again.
 pub const PROGRAM: &str = "imunoise";
 
-/// An open recording, by the way in which it is read.
+/// An open recording, by the way it is read.
 pub enum OpenRecording {
-    /// Register counts of an ADIS16405, whose rates were taken in this range.
+    /// Register counts of an ADIS16405 with this gyro range.
     Counts(RecordedInput, GyroRange),
     /// Numbers of any sensor.
     AnySensor(RecordedInput, Box<ReadOptions>),
-    /// A log of the bus of an ADIS16405, which was read, and sentences on it.
+    /// A log of the bus of an ADIS16405, already read, with notes about it.
     Replayed(Recording, Vec<String>),
 }
 
-/// How a recording of any format is opened.
+/// Options for opening a recording of any format.
 #[derive(Debug, Default)]
 pub struct OpenOptions {
-    /// The sensor, if it is stated.
+    /// The sensor, if the user states it.
     pub sensor: Option<SensorProfile>,
-    /// Which columns are read, and in which units they are.
+    /// The columns to be read, and their units.
     pub selection: ColumnSelection,
-    /// Topic, message or array of a file with several.
+    /// Topic, message or array of a file that has several.
     pub topic: Option<String>,
-    /// Range of the gyros, where the recording is one of an ADIS16405.
+    /// Range of the gyros if the recording is of an ADIS16405.
     pub range: GyroRange,
 }
 
@@ -54,16 +54,16 @@ pub struct OpenStream {
     pub stream: SampleStream,
     /// Hash of the file; a log of the bus has none.
     pub hash: Option<FileHash>,
-    /// Sentences on the file.
+    /// Notes about the file.
     pub notes: Vec<String>,
 }
 
 impl OpenRecording {
-    /// The recording in `input`: register counts and logs of the bus are those of an ADIS16405 with the gyros' `range`, unless `options`
-    /// say another sensor or the columns.
+    /// Opens the recording in `input`. Register counts and logs of the bus belong to an ADIS16405 with the gyro range of `options`, unless
+    /// `options` name another sensor or the columns.
     ///
     /// # Errors
-    /// A log is damaged, or a topic is asked of a format that has none.
+    /// A log is damaged, or a topic was requested of a format without topics.
     pub fn new(input: RecordedInput, options: OpenOptions) -> Result<Self> {
         let OpenOptions { sensor, selection, topic, range } = options;
         let has_topics = !input.format().is_text() || input.format() == RecordedFormat::File(FileFormat::TextTable);
@@ -85,7 +85,7 @@ impl OpenRecording {
         })
     }
 
-    /// Its samples.
+    /// The samples of the recording.
     ///
     /// # Errors
     /// The recording is damaged, or has no time base.
@@ -107,10 +107,10 @@ impl OpenRecording {
     }
 }
 
-/// Samples that the driver reads in a log or in counts, and sentences on the log.
+/// Replays a log or counts through the driver; returns the samples, and notes about the log.
 ///
 /// # Errors
-/// As [`simulation::replay`].
+/// Those of [`simulation::replay`].
 pub fn replayed(input: &RecordedInput, range: GyroRange) -> Result<(Recording, Vec<String>), InputError> {
     let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range)?;
     let mut notes = timing.notes();
@@ -124,18 +124,18 @@ pub fn replayed(input: &RecordedInput, range: GyroRange) -> Result<(Recording, V
 #[must_use]
 pub fn named(error: StreamError, file: &Path) -> Error {
     match error {
-        // The others name the file themselves.
+        // The other errors name the file themselves.
         StreamError::TimeBase(error) => Error::from(error).context(file.display().to_string()),
         error => error.into(),
     }
 }
 
-/// All samples of a recording, of which a long one is condensed.
+/// All samples of a recording; a long one is condensed.
 #[expect(clippy::large_enum_variant, reason = "one value for an analysis")]
 pub enum ReadSamples {
-    /// All of them.
+    /// All samples.
     Whole(Measurement),
-    /// Condensed form of a long recording.
+    /// The condensed form of a long recording.
     Condensed(CondensedRecord<'static>),
 }
 
@@ -154,7 +154,7 @@ impl ReadSamples {
         Ok(Self::Condensed(condensed))
     }
 
-    /// Their report; `watch` is called with each stage when it begins.
+    /// The report of the samples; `watch` is called at the begin of each stage.
     #[must_use]
     pub fn analyze(self, watch: &dyn Fn(Stage)) -> Report {
         match self {
@@ -164,7 +164,8 @@ impl ReadSamples {
     }
 }
 
-/// Record of the reading of `file`, without a hash; `options` are as typed for the command, `notes` sentences for the user.
+/// The record of the reading of `file`, without a hash. `options` are the words of the command line, `notes` sentences
+/// for the user.
 #[must_use]
 pub fn reading_record(stream: &SampleStream, file: String, options: Vec<String>, notes: Vec<String>) -> ReadingRecord {
     let read = stream.rows_read();
@@ -182,8 +183,8 @@ pub fn reading_record(stream: &SampleStream, file: String, options: Vec<String>,
     }
 }
 
-/// States the longest part at rest in a report of a moved platform: `by_file` where the file shows one, else by the motions that were
-/// found in the part of the recording that begins at `from_s`, s from its first sample.
+/// Adds the longest part at rest to the report of a moving platform. It is `by_file` if the file shows one, else it follows from the
+/// motions in the analysed part, which begins at `from_s`, s from the first sample.
 pub fn state_longest_at_rest(report: &mut Report, from_s: f64, by_file: impl FnOnce() -> Option<TimeRange>) {
     if !report.findings.iter().any(|finding| matches!(finding.effect, Effect::MotionInterval(_))) {
         return;

@@ -1,4 +1,4 @@
-//! Recordings that are read in blocks: for the report of the curves alone, and for that of a recording that is too long to be kept.
+//! Recordings read in blocks: for a report of the curves alone, or because they are too long to be kept.
 
 use measurement::SampleBlock;
 use noise_analysis::parallel;
@@ -9,10 +9,10 @@ use recordings::sample_stream::{SampleStream, StreamError};
 use std::sync::mpsc;
 use std::thread;
 
-/// Blocks that wait for the estimators.
+/// Number of blocks that may wait for the estimators.
 const WAITING: usize = 2;
 
-/// The estimators of the curves with all samples of `stream`.
+/// Reads all samples of `stream` into the estimators of the curves.
 ///
 /// # Errors
 /// The recording is damaged.
@@ -20,13 +20,13 @@ pub fn curves(stream: &mut SampleStream) -> Result<CurveEstimators, StreamError>
     read(stream, |stream| CurveEstimators::new(stream.description().clone()), CurveEstimators::push)
 }
 
-/// Condensed form of a long recording.
+/// Reads a long recording into its condensed form.
 pub(crate) fn long_record(stream: &mut SampleStream) -> Result<CondensedRecord<'static>, StreamError> {
     let begin = |stream: &SampleStream| LongRecordReader::new(stream.description().clone(), stream.beginning());
     Ok(read(stream, begin, LongRecordReader::push)?.finish())
 }
 
-/// Pushes all samples of `stream` into the value that `begin` makes of its description.
+/// Reads all samples of `stream` and pushes them into the value that `begin` makes of its description.
 fn read<T: Send>(
     stream: &mut SampleStream,
     begin: impl Fn(&SampleStream) -> T,
@@ -45,7 +45,7 @@ fn read<T: Send>(
     }
 }
 
-/// Reads while another thread takes what was read.
+/// Reads the stream while another thread processes the blocks.
 fn read_beside(stream: &mut SampleStream, mut take: impl FnMut(&SampleBlock) + Send) -> Result<bool, StreamError> {
     thread::scope(|scope| {
         let (sender, blocks) = mpsc::sync_channel(WAITING);
@@ -54,7 +54,7 @@ fn read_beside(stream: &mut SampleStream, mut take: impl FnMut(&SampleBlock) + S
                 take(&block);
             }
         });
-        // A block is not taken where the other thread has panicked, which ends this one too.
+        // If the other thread has panicked, the block is dropped; the scope then ends this thread too.
         stream.read(|block| drop(sender.send(block)))
     })
 }

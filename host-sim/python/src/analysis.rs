@@ -1,4 +1,4 @@
-//! The analysis of a recording: a file, bytes, or arrays.
+//! The analysis of a recording, which is a file, bytes, or arrays.
 
 use crate::arrays::Arrays;
 use crate::report::NativeReport;
@@ -19,10 +19,10 @@ pyo3::create_exception!(
     "A recording that cannot be read, or does not say all that is needed."
 );
 
-/// Time between two looks at what Python was sent.
+/// Time between two checks for signals in Python.
 const INTERVAL: Duration = Duration::from_millis(20);
 
-/// A signal that Python has taken while compiled code runs, such as Ctrl-C.
+/// A signal, such as Ctrl-C, that Python received while compiled code runs.
 struct Interruption {
     raised: Mutex<(Instant, Option<PyErr>)>,
 }
@@ -32,7 +32,7 @@ impl Interruption {
         Arc::new(Self { raised: Mutex::new((Instant::now(), None)) })
     }
 
-    /// True if a signal ends the work. Python takes signals on its main thread alone.
+    /// True if a signal ends the work. Python handles signals only on its main thread.
     fn is_raised(&self) -> bool {
         let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
         if raised.1.is_none() && raised.0.elapsed() > INTERVAL {
@@ -48,7 +48,7 @@ impl Interruption {
     }
 }
 
-/// A recording, by what Python passes.
+/// A recording, by the kind of Python object.
 #[derive(FromPyObject)]
 pub(crate) enum Source<'py> {
     Arrays(PyRef<'py, Arrays>),
@@ -56,7 +56,7 @@ pub(crate) enum Source<'py> {
     File(PathBuf),
 }
 
-/// Analyses a recording on `threads` threads, one of which is that of the caller.
+/// Analyses a recording on `threads` threads, including that of the caller.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are those of the function of Python")]
 pub(crate) fn analyze(
@@ -109,7 +109,7 @@ fn exception(AnalysisError { text, system }: AnalysisError) -> PyErr {
     }
 }
 
-/// Runs the command with these words, the name of the program first, and returns its exit code.
+/// Runs the command with these words, the first of which is the program's name, and returns its exit code.
 #[pyfunction]
 pub(crate) fn command(py: Python, words: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| host_sim::command::run(words, |_is_simulation| {}))

@@ -1,4 +1,4 @@
-//! Arrays of NumPy and tables of Arrow as the reader of recordings takes them: where they are, without a copy.
+//! NumPy arrays and Arrow tables as input for the reader of recordings, without a copy.
 
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{ArrowArrayStreamReader, FFI_ArrowArrayStream};
@@ -18,17 +18,17 @@ use recordings::{MemoryArray, MemoryColumn, MemoryTable, Number};
 use std::fmt;
 use std::sync::Arc;
 
-/// The numbers of a NumPy array of one dimension.
+/// The numbers of a one-dimensional NumPy array.
 struct Strided<T> {
-    /// Keeps the memory.
+    /// The owner, which keeps the memory alive.
     _owner: Py<PyAny>,
     first: *const T,
-    /// Elements from one number to the next.
+    /// Distance from one number to the next, in elements.
     stride: isize,
     rows: usize,
 }
 
-// SAFETY: the memory is read alone, and its owner keeps it; it may be released on any thread.
+// SAFETY: the memory is only read, and its owner keeps it alive; it may be released on any thread.
 unsafe impl<T: Sync> Send for Strided<T> {}
 // SAFETY: as above.
 unsafe impl<T: Sync> Sync for Strided<T> {}
@@ -55,7 +55,7 @@ impl<T: numpy::Element + Copy> Strided<T> {
     }
 }
 
-/// Declares the dtypes that are read, each with a number of it.
+/// Declares the dtypes that can be read, each with a conversion to a number.
 macro_rules! dtypes {
     ($($name:ident $type:ty, |$value:ident| $number:expr;)*) => {
         /// The numbers of a column.
@@ -107,7 +107,7 @@ fn unsigned(value: u64) -> Number {
     i64::try_from(value).map_or(Number::Real(value as f64), Number::Integer)
 }
 
-/// A column of NumPy, and which of its numbers are masked.
+/// A NumPy column, with its mask.
 #[derive(Debug)]
 struct NumpyColumn {
     numbers: ColumnNumbers,
@@ -128,10 +128,10 @@ impl MemoryColumn for NumpyColumn {
     }
 }
 
-/// A column of Arrow, in as many pieces as its table has batches.
+/// An Arrow column, in one piece per batch of its table.
 #[derive(Debug)]
 struct ArrowColumn {
-    /// Each with the row at which it begins.
+    /// The pieces, each with its first row.
     pieces: Vec<(usize, ArrayRef)>,
     rows: usize,
 }
@@ -165,7 +165,7 @@ impl MemoryColumn for ArrowColumn {
     }
 }
 
-/// Puts the numbers of an array of Arrow from `first` on into `numbers`.
+/// Puts the numbers of an Arrow array from `first` on into `numbers`.
 fn read_piece(piece: &ArrayRef, first: usize, numbers: &mut [Number]) {
     fn integers<T: ArrowPrimitiveType<Native: Into<i64>>>(piece: &ArrayRef, first: usize, numbers: &mut [Number]) {
         let values = piece.as_primitive::<T>().values()[first..].iter();
@@ -198,7 +198,7 @@ fn read_piece(piece: &ArrayRef, first: usize, numbers: &mut [Number]) {
         DataType::Duration(TimeUnit::Millisecond) => integers::<DurationMillisecondType>(piece, first, numbers),
         DataType::Duration(TimeUnit::Microsecond) => integers::<DurationMicrosecondType>(piece, first, numbers),
         DataType::Duration(TimeUnit::Nanosecond) => integers::<DurationNanosecondType>(piece, first, numbers),
-        // No column of another type is made.
+        // No column of another type is created.
         _ => numbers.fill(Number::Real(f64::NAN)),
     }
     if let Some(nulls) = piece.nulls() {
@@ -209,7 +209,7 @@ fn read_piece(piece: &ArrayRef, first: usize, numbers: &mut [Number]) {
     }
 }
 
-/// The unit of a column's numbers, where its type says it; `None` for a column without numbers.
+/// The unit of a column's numbers if its type names one; `None` if the column has no numbers.
 fn unit(field: &Field) -> Option<Option<&'static str>> {
     match field.data_type() {
         DataType::Timestamp(unit, _) | DataType::Duration(unit) => Some(Some(match unit {
@@ -234,10 +234,10 @@ fn unit(field: &Field) -> Option<Option<&'static str>> {
     }
 }
 
-/// One array: its name, its columns, each with its mask, and the unit that its type says.
+/// One array: its name, its columns with their masks, and the unit that its type names.
 type NumpyArray<'py> = (String, Vec<(Bound<'py, PyAny>, Option<PyReadonlyArray1<'py, bool>>)>, Option<String>);
 
-/// Arrays that are one recording.
+/// The arrays of one recording.
 #[pyclass(frozen, module = "imunoise._native")]
 pub(crate) struct Arrays {
     pub(crate) table: Arc<MemoryTable>,
@@ -247,7 +247,7 @@ pub(crate) struct Arrays {
 
 #[pymethods]
 impl Arrays {
-    /// The recording in arrays of NumPy.
+    /// The recording in NumPy arrays.
     #[staticmethod]
     fn of_numpy(arrays: Vec<NumpyArray>) -> PyResult<Self> {
         let array = |(name, columns, unit): NumpyArray| {
@@ -262,7 +262,7 @@ impl Arrays {
         Ok(Self { table: Arc::new(MemoryTable { arrays }), notes: Vec::new() })
     }
 
-    /// The recording in the table that `__arrow_c_stream__` gives.
+    /// The recording in the table of `__arrow_c_stream__`.
     #[staticmethod]
     fn of_stream(py: Python, stream: &Bound<PyCapsule>) -> PyResult<Self> {
         let pointer = stream.pointer_checked(Some(c"arrow_array_stream"))?.cast::<FFI_ArrowArrayStream>();

@@ -1,4 +1,4 @@
-//! A channel and covariates that are sampled together, and the regression of the one on the others.
+//! A channel and covariates sampled together, and the regression of the channel on the covariates.
 
 use crate::OCTAVES;
 use crate::curve::NativeCurve;
@@ -13,12 +13,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 const OVERLAP: usize = 8;
 
-/// Index of the covariate, sensitivity with its lower and upper bound, and its significance in standard deviations.
+/// Index of a covariate, its sensitivity with lower and upper bound, and its significance in standard deviations.
 type Row = (usize, f64, f64, f64, f64);
-/// Samples of one channel: an array, with a grid of origin and LSB if they are values in a unit.
+/// Samples of one channel: an array, and a grid of origin and LSB for values in a unit.
 type Samples<'py> = (Array<'py>, Option<Grid>);
 
-/// The channels, the channel of interest first, and the coupling of each with each one before it.
+/// The channels, the regressed one first, and the coupling of each with all channels before it.
 #[derive(Clone)]
 struct Channels {
     cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
@@ -31,7 +31,7 @@ fn pair(a: usize, b: usize) -> usize {
     high * (high - 1) / 2 + low
 }
 
-/// The counts of a channel's samples; `None` where one is missing.
+/// The counts of a channel's samples; `None` for a missing sample.
 fn column(mut counts: Counts, values: Values) -> PyResult<Vec<Option<i32>>> {
     let mut column = Vec::with_capacity(values.len());
     counts.each_run(values, |counts, rest| {
@@ -69,7 +69,7 @@ pub(crate) struct CoupledEstimators {
 
 impl CoupledEstimators {
     fn lock(&self) -> MutexGuard<'_, Channels> {
-        // A panic in another thread would leave sums that are as valid as any.
+        // After a panic in another thread the sums are still valid.
         self.channels.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -87,8 +87,8 @@ impl CoupledEstimators {
         Ok(Self { channels: Mutex::new(Channels { cascades, couplings }) })
     }
 
-    /// Adds samples that were taken together. `first` is the index of the first one in the user's arrays, for messages.
-    /// Nothing is added if a value is refused.
+    /// Adds samples taken together. `first` is the index of the first one in the user's arrays, for messages. If a
+    /// value is refused, no sample is added.
     fn push(&self, py: Python, channels: Vec<Samples>, first: u64) -> PyResult<()> {
         let samples = channels.iter().map(|(array, grid)| Ok((Counts::new(*grid, first)?, array.values())));
         let samples = samples.collect::<PyResult<Vec<_>>>()?;
@@ -108,12 +108,12 @@ impl CoupledEstimators {
         })
     }
 
-    /// Says that `missing` samples of all channels are missing before the next ones.
+    /// Records that `missing` samples of all channels are missing before the next ones.
     fn gap(&self, py: Python, missing: u32) {
         py.detach(|| self.lock().cascades.iter_mut().for_each(|cascade| cascade.gap(missing)));
     }
 
-    /// Samples taken of the channel of interest.
+    /// Number of samples of the regressed channel.
     fn samples(&self, py: Python) -> u64 {
         py.detach(|| self.lock().cascades[0].len())
     }
@@ -156,12 +156,12 @@ impl CoupledEstimators {
         })
     }
 
-    /// Estimators with the same state.
+    /// Copies the estimators with their state.
     fn copy(&self, py: Python) -> Self {
         py.detach(|| Self { channels: Mutex::new(self.lock().clone()) })
     }
 
-    /// The whole state, with versions and checksums.
+    /// The whole state as bytes, with versions and checksums.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| {
             let channels = self.lock();
@@ -170,7 +170,7 @@ impl CoupledEstimators {
         Ok(PyBytes::new(py, &bytes.map_err(|error| PyRuntimeError::new_err(error.to_string()))?))
     }
 
-    /// The estimators of [`state`](Self::state).
+    /// Restores the estimators from a [`state`](Self::state).
     #[staticmethod]
     fn from_state(py: Python, state: &[u8]) -> PyResult<Self> {
         let found: Result<(Vec<_>, Vec<_>), _> = py.detach(|| from_bytes(state));

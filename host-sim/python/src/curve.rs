@@ -7,7 +7,8 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// n, τ, σ², its lower and upper bound, edf, count, overlap, share of replaced samples, kurtosis and power law.
+/// A point: n, τ, σ², its lower and upper bound, edf, count, overlap, share of replaced samples, kurtosis and power
+/// law.
 type Row = (u64, f64, f64, f64, f64, f64, u64, u32, f64, Option<f64>, &'static str);
 
 /// The curve behind `imunoise.Curve`.
@@ -47,7 +48,7 @@ impl NativeCurve {
         self.curve.points().iter().map(row).collect()
     }
 
-    /// The curve with the points of these averaging times in s.
+    /// The curve restricted to averaging times from `shortest` to `longest`, s.
     fn between(&self, shortest: f64, longest: f64) -> Self {
         let mut curve = self.curve.clone();
         curve.retain(|point| (shortest..=longest).contains(&point.tau));
@@ -60,7 +61,7 @@ impl NativeCurve {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// The curve of [`state`](Self::state).
+    /// Restores the curve from a [`state`](Self::state).
     #[staticmethod]
     fn from_state(state: &[u8]) -> PyResult<Self> {
         let curve = from_bytes(state);

@@ -1,4 +1,4 @@
-//! One channel's estimator, with any overlap.
+//! The estimator of one channel, with any overlap.
 
 use crate::OCTAVES;
 use crate::curve::NativeCurve;
@@ -73,7 +73,7 @@ pub(crate) struct Estimator {
 
 impl Estimator {
     fn lock(&self) -> MutexGuard<'_, AnyOverlap> {
-        // A panic in another thread would leave sums that are as valid as any.
+        // After a panic in another thread the sums are still valid.
         self.cascade.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -87,22 +87,22 @@ impl Estimator {
 
     /// Adds the samples of an array: counts, or values in a unit if `grid` is `(origin, lsb)`.
     ///
-    /// `first` is the index of the first one in the user's array, for messages. If a value is refused, some of those before
-    /// it have been added.
+    /// `first` is the index of the first sample in the user's array, for messages. If a value is refused, some samples
+    /// before it have been added.
     fn push(&self, py: Python, samples: Array, grid: Option<Grid>, first: u64) -> PyResult<()> {
         let (values, counts) = (samples.values(), Counts::new(grid, first)?);
         py.detach(|| self.lock().push(counts, values))
     }
 
-    /// Says that `missing` samples are missing before the next one.
+    /// Records that `missing` samples are missing before the next one.
     fn gap(&self, py: Python, missing: u64) {
         py.detach(|| self.lock().gap(missing));
     }
 
-    /// Adds the sums of another estimator with the same overlap, which has seen a later stretch.
+    /// Adds the sums of another estimator with the same overlap, which has seen a later part of the record.
     fn merge(&self, py: Python, later: &Self) -> PyResult<()> {
         py.detach(|| {
-            // A copy, because both may be the same.
+            // A copy is needed, since both may be the same object.
             let later = later.lock().clone();
             match (&mut *self.lock(), &later) {
                 (AnyOverlap::One(first), AnyOverlap::One(later)) => first.merge(later),
@@ -116,7 +116,7 @@ impl Estimator {
         })
     }
 
-    /// Samples taken, samples missing, and those of them that the curve replaces.
+    /// Number of samples, number of missing samples, and number of missing samples that the curve replaces.
     fn samples(&self, py: Python) -> (u64, u64, u64) {
         py.detach(|| with_cascade!(&*self.lock(), cascade => (cascade.len(), cascade.missing(), cascade.replaced())))
     }
@@ -134,19 +134,19 @@ impl Estimator {
         })
     }
 
-    /// An estimator with the same state.
+    /// Copies the estimator with its state.
     fn copy(&self, py: Python) -> Self {
         py.detach(|| Self { cascade: Mutex::new(self.lock().clone()) })
     }
 
-    /// The whole state, with version and checksum.
+    /// The whole state as bytes, with version and checksum.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| with_cascade!(&*self.lock(), cascade => to_allocvec(cascade)));
         let bytes = bytes.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// An estimator with this overlap and [`state`](Self::state).
+    /// Restores an estimator with this overlap from a [`state`](Self::state).
     #[staticmethod]
     fn from_state(py: Python, overlap: u32, state: &[u8]) -> PyResult<Self> {
         let cascade = py.detach(|| {

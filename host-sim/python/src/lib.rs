@@ -1,8 +1,8 @@
-//! The compiled half of the Python module `imunoise`. The other half, in `package/imunoise`, turns what users have
-//! (lists, series, time stamps, names) into arrays and numbers, and wraps the results in arrays.
+//! The compiled half of the Python module `imunoise`. The other half, in `package/imunoise`, converts the users' lists,
+//! series, time stamps and names into arrays and numbers, and wraps the results in arrays.
 //!
-//! Arrays are read where they are, without the global interpreter lock: another thread must not write to them meanwhile, as
-//! with the functions of NumPy. No method holds a mutex while it waits for that lock.
+//! Arrays are read in place, without the global interpreter lock. As with functions of NumPy, no other thread may write
+//! to them meanwhile. No method holds a mutex while it waits for that lock.
 
 mod analysis;
 mod arrays;

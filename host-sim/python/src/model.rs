@@ -23,7 +23,7 @@ pub(crate) struct NativeModel {
     pub(crate) model: Model,
 }
 
-/// A number above 0 from the shape parameters of the term `name`.
+/// The shape parameter of the term `name`, checked to be above 0.
 fn positive(name: &str, parameter: &str, value: f64) -> PyResult<f64> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
@@ -31,7 +31,7 @@ fn positive(name: &str, parameter: &str, value: f64) -> PyResult<f64> {
     Err(PyValueError::new_err(format!("{name}: {parameter} is {value}, it must be above 0")))
 }
 
-/// The filter of these stages, taps and decimation.
+/// The filter with these stages, taps and decimation.
 pub(crate) fn filter(stages: f64, taps: f64, decimation: f64) -> PyResult<MovingAverageFilter> {
     if (stages != 1.0 && stages != 2.0) || !(1.0..=128.0).contains(&taps) || taps.fract() != 0.0 {
         return Err(PyValueError::new_err(format!(
@@ -137,7 +137,7 @@ impl NativeModel {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// The model of [`state`](Self::state).
+    /// Restores the model from a [`state`](Self::state).
     #[staticmethod]
     fn from_state(state: &[u8]) -> PyResult<Self> {
         let model = from_bytes(state);

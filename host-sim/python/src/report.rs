@@ -1,4 +1,4 @@
-//! The report of an analysis, and its rows as a table of Arrow.
+//! The report of an analysis, and its rows as an Arrow table.
 
 use anstream::StripStream;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
@@ -19,7 +19,7 @@ use reports::terminal::Screen;
 use reports::{figure, page};
 use std::sync::Arc;
 
-/// Columns of a report as text.
+/// Columns of the report's text.
 const COLUMNS: usize = 80;
 
 /// The report behind `imunoise.Report`.
@@ -33,7 +33,7 @@ fn failed(error: impl std::fmt::Display) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
 }
 
-/// The value of this name.
+/// The value with this name.
 fn named<T: ValueEnum>(what: &str, name: &str) -> PyResult<T> {
     T::from_str(name, true).map_err(|_| {
         let names = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
@@ -44,7 +44,7 @@ fn named<T: ValueEnum>(what: &str, name: &str) -> PyResult<T> {
 
 #[pymethods]
 impl NativeReport {
-    /// How the recording is called.
+    /// Name of the recording.
     fn name(&self) -> &str {
         &self.name
     }
@@ -66,7 +66,7 @@ impl NativeReport {
         })
     }
 
-    /// The page, or its first screen alone.
+    /// The page, or only its first screen.
     fn page(&self, py: Python, is_whole: bool) -> String {
         let Analysed { report, reading } = &self.analysed;
         let make = if is_whole { page::html_with_reading } else { page::first_screen };
@@ -82,8 +82,8 @@ impl NativeReport {
         Ok(figure::allan_deviation(report, found))
     }
 
-    /// The noise in the format of another program, and the fields that it wants and the report does not have; the number for three axes is
-    /// their root mean square or the largest.
+    /// The noise in the format of another program, and the fields of the format that the report lacks. If the format has one number for
+    /// three axes, `axis` selects their root mean square or the largest.
     fn export(&self, format: &str, axis: &str) -> PyResult<(String, Vec<String>)> {
         let format: ExportFormat = named("format", format)?;
         let axis: AxisChoice = named("axis", axis)?;
@@ -92,7 +92,7 @@ impl NativeReport {
         Ok((exported.text, exported.missing.iter().map(ToString::to_string).collect()))
     }
 
-    /// The rows.
+    /// The rows of the report.
     fn rows(&self) -> Rows {
         Rows { rows: rows(&self.analysed.report, &self.name, self.analysed.reading.as_ref()) }
     }
@@ -157,7 +157,7 @@ impl Rows {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // A schema is requested at the producer's best effort: this one has one.
+        // A requested schema is optional for the producer, and this one has a fixed schema.
         drop(requested_schema);
         let batch = self.batch().map_err(failed)?;
         let schema = batch.schema();
@@ -171,7 +171,7 @@ impl Rows {
         PyCapsule::new_with_value(py, schema, c"arrow_schema")
     }
 
-    /// The rows as one JSON object a line.
+    /// The rows as lines of JSON, one object per line.
     fn json_lines(&self) -> PyResult<String> {
         let lines = self.rows.iter().map(|row| serde_json::to_string(row).map(|line| line + "\n"));
         lines.collect::<Result<String, _>>().map_err(failed)
@@ -182,20 +182,20 @@ impl Rows {
         Ok(PyBytes::new(py, &to_allocvec(&self.rows).map_err(failed)?))
     }
 
-    /// The rows of [`state`](Self::state).
+    /// Restores the rows from a [`state`](Self::state).
     #[staticmethod]
     fn from_state(state: &[u8]) -> PyResult<Self> {
         let rows = from_bytes(state).map_err(|error| PyValueError::new_err(format!("no rows of reports: {error}")));
         Ok(Self { rows: rows? })
     }
 
-    /// The row of a recording that has no report.
+    /// The row of a recording without a report.
     #[staticmethod]
     fn of_failure(recording: &str, reason: &str) -> Self {
         Self { rows: vec![ReportRow::failed(recording, reason, env!("CARGO_PKG_VERSION"))] }
     }
 
-    /// The rows of all of `tables`.
+    /// The rows of all `tables`.
     #[staticmethod]
     fn joined(tables: Vec<PyRef<Self>>) -> Self {
         Self { rows: tables.iter().flat_map(|table| table.rows.clone()).collect() }

@@ -1,4 +1,4 @@
-//! Input from Python: arrays of samples, read where they are, and their counts.
+//! Input from Python: arrays of samples, read in place, and their counts.
 
 use allan_core::{Quantizer, SampleError};
 use numpy::ndarray::{ArrayView1, Axis, Slice};
@@ -10,11 +10,11 @@ use std::fmt::Display;
 /// Origin and LSB of a quantizer.
 pub(crate) type Grid = (f64, f64);
 
-/// Samples that are turned into counts together: their counts stay in the nearest cache.
+/// Number of samples converted together; their counts stay in the nearest cache.
 const BLOCK: usize = 4096;
 
-/// Declares the dtypes that are read without a copy, each with the bits of a sample beyond those of a count, all of them 0 where
-/// it is one.
+/// Declares the dtypes that are read without a copy. Each has the bits of a sample that do not fit a count; they are 0 if the sample is a
+/// count.
 macro_rules! dtypes {
     ($($name:ident $type:ty, $is_float:literal, |$value:ident| $beyond:expr;)*) => {
         /// An array of samples that Python holds.
@@ -69,7 +69,7 @@ macro_rules! dtypes {
         }
 
         impl Counts {
-            /// Calls `take` with the counts of all samples in runs, each as long as a block or up to a sample that is missing.
+            /// Calls `take` with the counts of all samples in runs. A run ends with a block or before a missing sample.
             pub(crate) fn each_run(&mut self, values: Values, take: impl FnMut(&[i32], Rest)) -> PyResult<()> {
                 match values {
                     $(Values::$name(values) => self.each_block(values, |$value| $beyond, take),)*
@@ -91,7 +91,7 @@ dtypes! {
     Float64 f64, true, |_value| 1;
 }
 
-/// The counts of the first samples of a part of an array.
+/// Counts of the first samples of a part of an array.
 pub(crate) struct Counts {
     counts: [i32; BLOCK],
     quantizer: Option<Quantizer>,
@@ -99,11 +99,11 @@ pub(crate) struct Counts {
     first: u64,
 }
 
-/// The samples after some counts.
+/// The rest after some counts.
 pub(crate) enum Rest {
-    /// There are none.
+    /// There are no more samples.
     End,
-    /// The next one is missing.
+    /// The next sample is missing.
     Missing,
 }
 
@@ -116,7 +116,7 @@ impl Counts {
         Ok(Self { counts: [0; BLOCK], quantizer: grid.map(quantizer).transpose()?, first })
     }
 
-    /// [`each_run`](Self::each_run) for samples of one type. Without a grid those with no bits `beyond` a count's are counts.
+    /// [`each_run`](Self::each_run) for samples of one type. Without a grid, samples whose bits `beyond` a count are 0 are counts.
     fn each_block<T: Sample>(
         &mut self,
         values: ArrayView1<T>,
@@ -158,7 +158,7 @@ impl Counts {
 
 /// A type of samples.
 trait Sample: Copy + Default + Display {
-    /// The samples as counts without a copy, if that is what they are.
+    /// The samples as counts without a copy, if they are counts.
     fn counts(_values: &[Self]) -> Option<&[i32]> {
         None
     }
@@ -168,7 +168,7 @@ trait Sample: Copy + Default + Display {
 
     fn to_f64(self) -> f64;
 
-    /// Puts the counts of the first samples on a grid; returns how many have one.
+    /// Puts the counts of the first samples on a grid into `counts`; returns the number of samples that have one.
     fn put_rounded(quantizer: &Quantizer, values: &[Self], counts: &mut [i32]) -> usize;
 }
 
@@ -200,12 +200,12 @@ samples! {
     u32: Quantizer::counts;
     f32: Quantizer::counts;
     f64: Quantizer::counts;
-    // Integers of 64 bits are rounded to doubles first.
+    // Integers of 64 bits are first rounded to doubles.
     i64: |quantizer: &Quantizer, values: &[i64], counts| put_each(quantizer, values, counts);
     u64: |quantizer: &Quantizer, values: &[u64], counts| put_each(quantizer, values, counts);
 }
 
-/// Puts integers into `counts` up to the first one with bits `beyond` those of a count; returns how many.
+/// Puts integers into `counts` up to the first one with bits `beyond` those of a count; returns their number.
 fn put_integers<T: Sample>(values: &[T], counts: &mut [i32], beyond: impl Fn(T) -> u64) -> usize {
     let mut found = 0;
     for (count, &value) in counts.iter_mut().zip(values) {
@@ -215,7 +215,7 @@ fn put_integers<T: Sample>(values: &[T], counts: &mut [i32], beyond: impl Fn(T) 
     if found == 0 { values.len() } else { values.iter().take_while(|&&value| beyond(value) == 0).count() }
 }
 
-/// Puts the counts of samples on a grid into `counts`, one by one; returns how many have one.
+/// Puts the counts of samples on a grid into `counts` one by one; returns the number of samples that have one.
 fn put_each<T: Sample>(quantizer: &Quantizer, values: &[T], counts: &mut [i32]) -> usize {
     let mut put = 0;
     for (count, value) in counts.iter_mut().zip(values) {
@@ -225,7 +225,7 @@ fn put_each<T: Sample>(quantizer: &Quantizer, values: &[T], counts: &mut [i32]) 
     put
 }
 
-/// Whether a sample that has no count is missing, that is NaN; anything else is an error.
+/// Checks a sample that has no count: NaN is a missing sample, any other value is an error.
 fn check_missing(value: impl Sample, quantizer: Option<Quantizer>, index: u64) -> PyResult<()> {
     let Some(quantizer) = quantizer else {
         return Err(PyOverflowError::new_err(format!(
@@ -246,7 +246,7 @@ fn check_missing(value: impl Sample, quantizer: Option<Quantizer>, index: u64) -
     }
 }
 
-/// Origin and LSB for the floats of an array.
+/// Origin and LSB of the grid for an array of floats.
 #[pyfunction]
 pub(crate) fn automatic_quantizer(py: Python, samples: Array) -> Option<Grid> {
     let values = samples.values();

@@ -1,19 +1,19 @@
-//! Gaps between time stamps; their arithmetic is that of allan-core.
+//! Gaps between time stamps, by the arithmetic of allan-core.
 
 use allan_core::{TimeStampError, TimeStamps};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Ticks of a sample period, in which time stamps are rounded.
+/// Ticks per sample period, to which time stamps are rounded.
 const TICKS: u32 = 1 << 20;
 
-/// Gaps, each with the index of the sample after it and its length in samples; and when the last sample was expected, s.
+/// Gaps, each with the index of the sample after it and its length in samples, and the expected time of the last
+/// sample, s.
 type GapsBefore = (Vec<(usize, u32)>, Option<f64>);
 
-/// The gaps that [`TimeStamps`] finds: index of the sample after each and its length in samples, and the time in s at which
-/// the last sample was expected. `times` are the `float64` time stamps in s, `previous` is the time at which the sample before
-/// the first of them was expected.
+/// The gaps that [`TimeStamps`] finds, each with the index of the sample after it and its length in samples, and the expected time of the
+/// last sample in s. `times` are `float64` time stamps in s. `previous` is the expected time of the sample before them.
 #[pyfunction]
 pub(crate) fn gaps(py: Python, times: PyReadonlyArray1<f64>, rate: f64, previous: Option<f64>) -> PyResult<GapsBefore> {
     let times = times.as_slice()?;
@@ -26,7 +26,7 @@ pub(crate) fn gaps(py: Python, times: PyReadonlyArray1<f64>, rate: f64, previous
         }
         for (index, &time) in times.iter().enumerate() {
             let ticks = ((time - *start.get_or_insert(time)) * ticks_a_second).round();
-            // Further away a tick count would not fit; the largest gap is 2³² samples.
+            // At larger times a tick count would not fit; the largest gap is 2³² samples.
             let found = match ticks.abs() < (1_u64 << 62) as f64 {
                 true => stamps.missing(ticks as i64 as u64),
                 false if ticks < 0.0 => Err(TimeStampError::NotLater),

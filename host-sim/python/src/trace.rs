@@ -1,4 +1,4 @@
-//! The search for missing terms, which Ctrl-C or a function of the user may cancel.
+//! The search for missing terms, which Ctrl-C or a function of the user can cancel.
 
 use crate::curve::NativeCurve;
 use crate::model::{NativeModel, filter};
@@ -8,16 +8,16 @@ use allan_core::{Model, NoiseTerm};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// An added term: its index in the final model, its score, and the largest residual before it was added: averaging factor,
-/// excess and standard deviations.
+/// An added term: its index in the final model, its score, and the largest residual before it was added, by averaging
+/// factor, excess and standard deviations.
 type Added = (usize, f64, u64, f64, f64);
-/// The two models with their deviance and p-value, the added terms, and whether the search was completed.
+/// The two models, each with deviance and p-value, the added terms, and true if the search was completed.
 type Found = ((NativeModel, f64, f64), (NativeModel, f64, f64), Vec<Added>, bool);
 
 /// Fits N, B and K to `curve` and adds the missing terms.
 ///
-/// `lines` are frequencies in Hz from a spectrum, `filters` stages, taps and decimation of the sensor's possible filters.
-/// `keep_on` is called between the fits; if it returns false the search ends.
+/// `lines` are frequencies in Hz from a spectrum; `filters` are stages, taps and decimation of the sensor's possible
+/// filters. `keep_on` is called between the fits. If it returns false, the search ends.
 #[pyfunction]
 #[pyo3(signature = (curve, lines, filters, keep_on))]
 pub(crate) fn trace(

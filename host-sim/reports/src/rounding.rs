@@ -122,6 +122,21 @@ pub fn plain(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// Of a column of any magnitude: `100`, `−0.0413`, `−3.92e−4`. An integer has all of its digits.
+#[must_use]
+pub fn compact(value: f64, digits: i32) -> String {
+    let is_usual = !value.is_finite() || (1e-3..1e7).contains(&value.abs());
+    if value.fract() != 0.0 && is_usual {
+        return plain(value, digits);
+    }
+    if value.fract() == 0.0 && value.abs() < 1e20 {
+        return format!("{value:.0}").replace('-', "−");
+    }
+    let scaled = format!("{value:.*e}", usize::try_from(digits - 1).unwrap_or(0)).replace('-', "−");
+    let (mantissa, exponent) = scaled.split_once('e').unwrap_or((&scaled, "0"));
+    format!("{}e{exponent}", mantissa.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// Two digits; `< 0.001` below.
 #[must_use]
 pub fn probability(p: f64) -> String {
@@ -368,6 +383,22 @@ mod tests {
         }
         // Only the upper bound is known: its prefix.
         assert_eq!(bounded_quantity(&Parameter::new(0.0, 0.0, 19e-6, "g")), "< 19 µg");
+    }
+
+    #[test]
+    fn a_number_of_any_magnitude_has_one_minus_sign_and_no_zeros_at_its_end() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-300.0, "−300"),
+            (1_784_000_000_123_456.0, "1784000000123456"),
+            (-0.041_3, "−0.0413"),
+            (-3.916_65e-4, "−3.91665e−4"),
+            (1e-4, "1e−4"),
+            (12_345_678.5, "1.23457e7"),
+            (f64::NAN, NONE),
+        ] {
+            assert_eq!(compact(value, 6), text, "{value:e}");
+        }
     }
 
     #[test]

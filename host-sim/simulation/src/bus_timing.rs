@@ -1,13 +1,12 @@
-//! The times on a captured bus against the limits of the data sheet.
+//! The times of a captured bus, compared with the limits of the data sheet.
 
 use recordings::recorded_file::CapturedFrame;
 use virtual_sensor::{MAX_SCK_BURST_HZ, MAX_SCK_NORMAL_HZ, MIN_READ_RATE_NORMAL_NS, MIN_STALL_NORMAL_NS};
 
-/// Share by which a clock may seem faster than it is: the capture has ticks, and chip select is low for longer than the clock
-/// runs, not shorter.
+/// Fraction by which a clock may seem too fast: the capture has ticks, and chip select is low for longer than the clock runs.
 const TOLERANCE: f64 = 0.01;
 
-/// Times of a captured bus. Without the ends of transactions nothing is counted.
+/// The times of a captured bus. Without the ends of transactions nothing is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CapturedBusTiming {
     /// Transactions whose begin and end are known.
@@ -15,13 +14,13 @@ pub struct CapturedBusTiming {
     /// Transactions whose clock is faster than the part allows: 1 MHz in a burst, 2 MHz elsewhere. The clock is at least the
     /// number of bits over the time of chip select.
     pub fast_clock: u64,
-    /// The fastest such lower limit of the clock, Hz.
+    /// The fastest of these clocks, as a lower limit, Hz.
     pub fastest_hz: f64,
     /// Transactions that begin sooner than 9 µs after the end of the one before.
     pub short_stall: u64,
     /// The shortest pause, s.
     pub shortest_stall_s: Option<f64>,
-    /// Transactions that begin sooner than 40 µs after the begin of the one before, and keep the pause.
+    /// Transactions that keep the pause but begin sooner than 40 µs after the begin of the one before.
     pub short_interval: u64,
     last_start_s: Option<f64>,
     last_end_s: Option<f64>,
@@ -51,7 +50,7 @@ impl CapturedBusTiming {
         }
     }
 
-    /// Notes for the user, one sentence each; none where the times are not known.
+    /// Notes for the user, one sentence each; none if the times are not known.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.timed > 0 {
@@ -89,18 +88,18 @@ mod tests {
     use super::*;
     use recordings::frame_log::Frame;
 
-    /// A transaction of so many bytes that begins at `start_us` and lasts for `low_us`.
+    /// A transaction of `bytes` bytes that begins at `start_us` and lasts for `low_us`, both in µs.
     fn transaction(bytes: usize, start_us: f64, low_us: f64) -> CapturedFrame {
         let frame = Frame { time_s: 1e-6 * start_us, mosi: vec![0; bytes], miso: vec![0; bytes] };
         CapturedFrame { frame, end_s: Some(1e-6 * (start_us + low_us)) }
     }
 
-    /// Data sheet Rev. B, Table 2 and Figure 3: at least 9 µs between the frames and 40 µs from one falling edge of chip select to the
-    /// next; SCK of at most 2 MHz, in a burst 1 MHz.
+    /// Data sheet Rev. B, Table 2 and Figure 3: at least 9 µs between frames and 40 µs from one falling edge of chip select to the next.
+    /// SCK is at most 2 MHz, in a burst 1 MHz.
     #[test]
     fn transactions_outside_the_limits_are_counted_by_rule() {
         let mut timing = CapturedBusTiming::default();
-        // Bytes, begin, time of chip select low: 16 bits at 1 MHz, 208 bits at 1 MHz.
+        // The columns are bytes, begin and time of chip select low; 16 and 208 bits at 1 MHz are within the limits.
         for (bytes, start_us, low_us) in [
             (2, 0.0, 16.0),
             (2, 40.0, 16.0),

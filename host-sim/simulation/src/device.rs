@@ -1,4 +1,4 @@
-//! The firmware's application on the host: the same code as in the image, with the virtual sensor, in virtual time.
+//! The firmware's application on the host: the code of the image, with the virtual sensor, in virtual time.
 
 use crate::fault_injector::{FaultEnd, FaultyBus, InjectedFaults};
 use crate::sample_audit::{Received, SampleAudit, lengths};
@@ -25,23 +25,24 @@ const WAKE_US: u64 = 100_000;
 /// Time after which the watchdog restarts the microcontroller if it is not fed, µs.
 const WATCHDOG_US: u64 = 8_000_000;
 
-/// Stall before the first frame after a burst, µs: that of low-power mode, of which the time of the part may lack a fraction.
+/// Stall before the first frame after a burst, µs. It is that of low-power mode and 1 µs more, since the time of the part is truncated.
 const STALL_US: u64 = 76;
 
-/// Time for which the flash memory takes a record, µs: that of a sector that is erased and of ten pages (Winbond, W25Q16JV).
+/// Time in which the flash memory takes a record, µs: one sector is erased and ten pages are programmed (Winbond,
+/// W25Q16JV).
 const FLASH_WRITE_US: u64 = 50_000;
 
-/// A simulated device: the application, the virtual sensor, and both ends of the serial link, whose transfers take no
+/// A simulated device: the application, the virtual sensor, and both ends of the serial link. Serial transfers take no
 /// virtual time.
 pub struct Device {
     app: App,
     board: SimulatedBoard,
     memory: &'static RetainedMemory,
-    /// Restarts are carried out, and the watchdog runs.
+    /// True if restarts are carried out and the watchdog runs.
     restarting: bool,
 }
 
-/// The simulated board: all but the application.
+/// The simulated board: everything but the application.
 struct SimulatedBoard {
     bus: FaultyBus,
     now_us: u64,
@@ -54,29 +55,30 @@ struct SimulatedBoard {
     received: VecDeque<u8>,
     restarts: u32,
     fed_us: u64,
-    /// The serial clock in Hz, if it cannot be changed.
+    /// The serial clock in Hz if it cannot be changed.
     fixed_sck_hz: Option<u32>,
-    /// The sensor's RST line is connected.
+    /// True if the sensor's RST line is connected.
     reset_line: bool,
-    /// Time for which the samples of the sensor could have been used, µs.
+    /// Time for which the sensor delivered usable samples, µs.
     usable_us: u64,
     /// Data-ready edges that have raised an interrupt.
     edges: u64,
     audit: SampleAudit,
-    /// Record that is kept without power.
+    /// The record that survives a loss of power.
     record: Option<Vec<u8>>,
     meter_readings: u32,
 }
 
 impl Device {
-    /// Starts the application, as the reset pin does, with a running sensor and the contents of the retained memory.
+    /// Starts the application as after a reset by the pin, with a running sensor and the contents of the retained
+    /// memory.
     ///
     /// Queues and statistics, 50 kB, are leaked: on the target they are statics.
     pub fn new(part: VirtualAdis16405, memory: &'static RetainedMemory) -> Self {
         Self::started_by(BootCause::Pin, part, memory)
     }
 
-    /// Starts the application for this cause.
+    /// Starts the application with this cause.
     pub fn started_by(cause: BootCause, part: VirtualAdis16405, memory: &'static RetainedMemory) -> Self {
         let now_us = part.now() / 1000;
         let mut board = SimulatedBoard::new(FaultyBus::new(EmulatedBus::with_sck_hz(part, SCK_HZ)), now_us);
@@ -84,28 +86,28 @@ impl Device {
         Self { app, board, memory, restarting: false }
     }
 
-    /// Has restarts carried out from now on, those by the watchdog included.
+    /// Makes the device carry out restarts, including those by the watchdog.
     #[must_use]
     pub fn with_restarts(mut self) -> Self {
         self.restarting = true;
         self
     }
 
-    /// Has a board whose serial clock cannot be changed.
+    /// Makes a device whose serial clock cannot be changed, Hz.
     #[must_use]
     pub fn with_fixed_clock(mut self, sck_hz: u32) -> Self {
         self.board.fixed_sck_hz = Some(sck_hz);
         self
     }
 
-    /// Has a board that connects the sensor's RST line.
+    /// Makes a device that connects the sensor's RST line.
     #[must_use]
     pub fn with_reset_line(mut self) -> Self {
         self.board.reset_line = true;
         self
     }
 
-    /// Has a board with a USB port whose host does not read.
+    /// Makes a device with a USB port whose host does not read.
     #[must_use]
     pub fn with_unread_usb(mut self) -> Self {
         let (to_port, _unread) = Box::leak(Box::new(TransmitBuffer::new())).split();
@@ -113,22 +115,22 @@ impl Device {
         self
     }
 
-    /// The faults, to change them.
+    /// The injected faults, for changes.
     pub fn faults(&self) -> RefMut<'_, InjectedFaults> {
         self.board.bus.faults().borrow_mut()
     }
 
-    /// Time for which the samples of the sensor could have been used, µs: no fault hid them, and the sensor was sampling.
+    /// Time for which the sensor delivered usable samples, µs: it was sampling and no fault hid the samples.
     pub fn usable_us(&self) -> u64 {
         self.board.usable_us
     }
 
-    /// Fate of the samples since the last call.
+    /// The audit of the samples since the last call.
     pub fn take_audit(&mut self) -> SampleAudit {
         std::mem::take(&mut self.board.audit)
     }
 
-    /// Times that the application has read the load figures of the board.
+    /// Number of times that the application has read the load figures of the board.
     pub fn meter_readings(&self) -> u32 {
         self.board.meter_readings
     }
@@ -170,12 +172,12 @@ impl Device {
         self.board.bus.bus()
     }
 
-    /// Number of restarts that the application requested or the watchdog made.
+    /// Number of restarts by the application and by the watchdog.
     pub fn restarts(&self) -> u32 {
         self.board.restarts
     }
 
-    /// Switches the supply of board and sensor off and on: what is kept without power is kept, and nothing else.
+    /// Switches the supply of board and sensor off and on. Only what is stored without power is kept.
     #[must_use]
     pub fn power_cycled(self, part: VirtualAdis16405) -> Self {
         let record = self.board.record;
@@ -231,7 +233,7 @@ impl SimulatedBoard {
         }
     }
 
-    /// Starts the application; all that is not retained is new.
+    /// Starts the application; everything that is not retained is new.
     fn boot(&mut self, cause: BootCause, memory: &'static RetainedMemory) -> App {
         let fresh = Self::new(self.bus.clone(), self.now_us);
         let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
@@ -255,7 +257,7 @@ impl SimulatedBoard {
         self.now_us = self.now_us.max(us);
     }
 
-    /// Takes the time of the part, which transactions and delays advance. Returns whether it has gone on.
+    /// Takes over the time of the part, which transactions and delays advance. True if it has advanced.
     fn follow_part(&mut self) -> bool {
         let now_us = self.now_us.max(self.bus.bus().part().now() / 1000);
         if !self.bus.faults().borrow().hide_samples() {
@@ -264,7 +266,7 @@ impl SimulatedBoard {
         std::mem::replace(&mut self.now_us, now_us) < now_us
     }
 
-    /// The two sampling interrupts and the one of the estimators.
+    /// Runs the two sampling interrupts and the interrupt of the estimators.
     fn data_ready(&mut self) {
         let mut received = None;
         if self.edge() == EdgeAction::StartBurst {
@@ -285,7 +287,7 @@ impl SimulatedBoard {
         }
     }
 
-    /// One edge, or many in a row if the line oscillates; none while it is masked.
+    /// Passes one edge, or many in a row if the line oscillates, or none while it is masked.
     fn edge(&mut self) -> EdgeAction {
         let edges = if self.bus.faults().borrow().oscillates { 1000 } else { 1 };
         let mut first = EdgeAction::Ignore;
@@ -313,7 +315,7 @@ impl Board for SimulatedBoard {
 
     fn now_us(&mut self) -> u64 {
         if self.follow_part() {
-            // A delay of the driver feeds the watchdog meanwhile, as on a board.
+            // A delay of the driver feeds the watchdog, as on a board.
             self.fed_us = self.now_us;
         }
         self.now_us
@@ -337,7 +339,7 @@ impl Board for SimulatedBoard {
         }
     }
 
-    /// Transfers of the emulated bus are complete when they return: nothing is left to reset.
+    /// Nothing is left to reset: transfers of the emulated bus are complete when they return.
     fn reset_bus(&mut self) {}
 
     fn reset_sensor(&mut self) -> bool {

@@ -1,4 +1,4 @@
-//! Faults between the virtual sensor and the application: a bus that damages frames and answers, and switches of the board.
+//! Faults between the virtual sensor and the application: damaged frames and answers, and faults of the board.
 
 use crate::line_fault::{LineFault, RandomFault};
 use adis16405_driver::BURST_BYTES;
@@ -26,7 +26,7 @@ const LOW_SUPPLY: [u8; 2] = [0x87, 0x98];
 /// DIAG_STAT, supply below 4.75 V.
 const SUPPLY_LOW: u16 = 1;
 
-/// How frames are damaged.
+/// The damage of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameFault {
     /// Gyro x has an impossible rate.
@@ -42,37 +42,37 @@ pub enum FrameFault {
     Frozen,
     /// No word has new data.
     Stale,
-    /// The supply is at 4.70 V, and DIAG_STAT says so. Nothing is damaged.
+    /// The supply is at 4.70 V and DIAG_STAT shows it. No word is damaged.
     LowSupply,
     /// A bit of every word is stuck, for all frames.
     StuckBit {
-        /// 0 for the last one.
+        /// Number of the bit, 0 for the last one.
         bit: u8,
         /// True if it reads one.
         high: bool,
     },
     /// Every bit of all frames comes one clock late, as with another SPI mode.
     Late,
-    /// One of so many ones reads zero, as with a level that is too low, for all frames.
+    /// One of this many ones reads zero in all frames, as with a level that is too low.
     OnesLost(u32),
-    /// Bits of every word to the sensor are stuck low: those that this mask lacks.
+    /// Bits that are 0 in this mask are stuck low in every word to the sensor.
     Requests(u16),
 }
 
-/// When a frame fault ends.
+/// The event that ends a frame fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultEnd {
-    /// After so many bursts.
+    /// This number of bursts has been damaged.
     Bursts(u32),
-    /// With a pulse on chip select without a clock.
+    /// A pulse on chip select comes without a clock.
     Pulse,
-    /// With a software reset.
+    /// The sensor is reset by its command.
     Reset,
-    /// With a pulse on the RST line.
+    /// The sensor is reset by its RST line.
     ResetLine,
-    /// With longer times on the bus.
+    /// The bus gets longer times.
     SlowBus,
-    /// Not by itself.
+    /// The fault does not end by itself.
     Never,
 }
 
@@ -81,35 +81,35 @@ pub enum FaultEnd {
 pub struct InjectedFaults {
     /// The frame fault and its end.
     pub frames: Option<(FrameFault, FaultEnd)>,
-    /// Bits of DIAG_STAT that are set until it is read, beside the sensor's own.
+    /// Bits of DIAG_STAT that are set until it is read, in addition to the sensor's own.
     pub status: u16,
     /// Bursts damaged so far, usable or not.
     pub damaged: u64,
-    /// The data-ready line is interrupted.
+    /// True if the data-ready line is interrupted.
     pub no_data_ready: bool,
-    /// The data-ready line oscillates: a thousand edges for every one.
+    /// True if the data-ready line oscillates: a thousand edges for each one.
     pub oscillates: bool,
-    /// The estimators' interrupt does not come.
+    /// True if the estimators' interrupt does not come.
     pub no_estimators: bool,
-    /// The serial port sends nothing.
+    /// True if the serial port sends nothing.
     pub no_transmission: bool,
     /// A fault that comes at random.
     pub random: Option<RandomFault>,
 }
 
 impl InjectedFaults {
-    /// True if the random fault has the transfer of a burst fail.
+    /// True if the random fault makes the transfer of a burst fail.
     pub(crate) fn fails_transfer(&mut self) -> bool {
         self.random.as_mut().is_some_and(|random| random.meets(LineFault::Failed))
     }
 
-    /// Number of data-ready edges that come in the place of one.
+    /// Number of data-ready edges that come instead of one.
     pub(crate) fn edges(&mut self) -> u32 {
         let mut meets = |fault| self.random.as_mut().is_some_and(|random| random.meets(fault));
         if self.no_data_ready || meets(LineFault::LostEdge) { 0 } else { 1 + u32::from(meets(LineFault::DoubledEdge)) }
     }
 
-    /// True if an observer who knew everything could not use the sensor's present samples.
+    /// True if the faults hide the sensor's present samples, so that they could not be used.
     pub(crate) fn hide_samples(&self) -> bool {
         let harmless = |fault| fault == FrameFault::LowSupply;
         self.no_data_ready
@@ -124,13 +124,13 @@ impl InjectedFaults {
 pub struct FaultyBus {
     bus: EmulatedBus,
     faults: Rc<RefCell<InjectedFaults>>,
-    /// First byte of the latest frame, whose answer comes with the next one.
+    /// First byte of the latest frame; its answer comes with the next one.
     latest: Rc<RefCell<u8>>,
     /// The burst that a frozen sensor repeats.
     frozen: Rc<RefCell<Option<[u8; BURST_BYTES]>>>,
     /// The latest burst as the sensor sent it.
     sent: Rc<RefCell<[u8; BURST_BYTES]>>,
-    /// Ones sent so far.
+    /// Number of ones sent so far.
     ones: Rc<Cell<u32>>,
     times: Rc<Cell<SelectTimes>>,
 }
@@ -151,7 +151,7 @@ impl FaultyBus {
         Self { bus, faults, latest, frozen, sent: Rc::default(), ones: Rc::default(), times }
     }
 
-    /// The times of the frames since they were taken last.
+    /// The times of the frames since the last call.
     pub(crate) fn take_frame_times(&self) -> FrameTimes {
         let times = self.times.get();
         self.times.set(SelectTimes { frames: FrameTimes { low_us: times.frames.low_us, ..FrameTimes::NONE }, ..times });
@@ -171,7 +171,7 @@ impl FaultyBus {
         self.times.set(SelectTimes { fell_ns, rose_ns: now_ns, frames });
     }
 
-    /// Damages what the sensor has sent in any frame.
+    /// Damages the answer of the sensor in any frame.
     fn damage_line(&self, answer: &mut [u8]) {
         let Some((fault, _)) = self.faults.borrow().frames else { return };
         match fault {
@@ -213,7 +213,7 @@ impl FaultyBus {
         &self.faults
     }
 
-    /// A pulse on the RST line of the part, which then starts up.
+    /// Pulses the RST line of the part, which then starts up.
     pub(crate) fn reset_part(&self) {
         let mut part = self.bus.part_mut();
         part.power_off();
@@ -223,7 +223,7 @@ impl FaultyBus {
         faults.frames = faults.frames.filter(|(_, end)| !matches!(end, FaultEnd::Reset | FaultEnd::ResetLine));
     }
 
-    /// Ends a frame fault by what the controller has sent.
+    /// Ends a frame fault if the transaction of the controller is its end.
     fn note_transaction(&self, sent: Option<[u8; 2]>) {
         let mut faults = self.faults.borrow_mut();
         let reset = sent.is_some_and(|[address, value]| address == WRITE_GLOB_CMD && value & SOFTWARE_RESET != 0);
@@ -282,7 +282,7 @@ impl FaultyBus {
         }
     }
 
-    /// The transaction on the bus, with the random fault if it meets it.
+    /// Runs the transaction on the bus, with the random fault if it occurs.
     fn transact(&mut self, operations: &mut [Operation<'_, u8>]) {
         let mut faults = self.faults.borrow_mut();
         if let Some((FrameFault::Requests(mask), _)) = faults.frames

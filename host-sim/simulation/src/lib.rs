@@ -1,4 +1,4 @@
-//! The driver, or the whole firmware, on the virtual sensor or on a replayed recording.
+//! The driver, or the whole firmware, with the virtual sensor or with a replayed recording.
 
 mod burst_order;
 mod bus_timing;

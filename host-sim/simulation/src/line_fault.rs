@@ -1,28 +1,29 @@
-//! Faults of the lines between sensor and microcontroller that come at random.
+//! Random faults of the lines between sensor and microcontroller.
 
 use adis16405_driver::BURST_BYTES;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Faults of the lines. Bits are inverted in every frame, each with the same probability; the others meet bursts.
+/// Faults of the lines. Bits are inverted in every frame, each with the same probability; the other faults occur by
+/// bursts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineFault {
     /// Bits of the sensor's answers are inverted.
     AnswerBits,
-    /// Bits of what the sensor is sent are inverted.
+    /// Bits of the requests to the sensor are inverted.
     RequestBits,
     /// A run of 2 to 16 bits of the answer is inverted.
     AnswerRun,
-    /// From a bit on the answer is low or high.
+    /// The answer is stuck from a random bit on.
     StuckFrom {
         /// True if it reads ones.
         high: bool,
     },
-    /// The sensor sees a clock less, and the bits that follow come early.
+    /// The sensor misses a clock, and the following bits come early.
     MissingClock,
-    /// The sensor sees a clock more, and the bits that follow come late.
+    /// The sensor sees an extra clock, and the following bits come late.
     ExtraClock,
-    /// The burst before arrives again.
+    /// The previous burst arrives again.
     Repeated,
     /// Chip select rises within the burst.
     ShortSelect,
@@ -37,7 +38,7 @@ pub enum LineFault {
 }
 
 impl LineFault {
-    /// Every fault.
+    /// All faults.
     pub const ALL: [Self; 13] = [
         Self::AnswerBits,
         Self::RequestBits,
@@ -54,13 +55,13 @@ impl LineFault {
         Self::DoubledEdge,
     ];
 
-    /// True if it meets bits; the others meet bursts.
+    /// True if the fault occurs by bits, false if by bursts.
     pub fn is_of_bits(self) -> bool {
         matches!(self, Self::AnswerBits | Self::RequestBits)
     }
 }
 
-/// A [`LineFault`] and how often it comes.
+/// A [`LineFault`] and its probability.
 #[derive(Debug, Clone)]
 pub struct RandomFault {
     fault: LineFault,
@@ -69,7 +70,7 @@ pub struct RandomFault {
 }
 
 impl RandomFault {
-    /// A fault with this probability: of a bit, or of a burst.
+    /// A fault with this probability per bit or per burst.
     ///
     /// # Panics
     /// The probability is not in 0 to 1.
@@ -83,7 +84,7 @@ impl RandomFault {
         self.fault
     }
 
-    /// True if it meets, if it is `fault`.
+    /// True if this is `fault` and it occurs now.
     pub(crate) fn meets(&mut self, fault: LineFault) -> bool {
         self.fault == fault && self.random.random_bool(self.probability)
     }
@@ -106,8 +107,8 @@ impl RandomFault {
         ends.then(|| self.random.random_range(1..BURST_BYTES))
     }
 
-    /// Damages what the sensor has sent; `before` is the burst before if this is one. Returns whether the sensor has seen another
-    /// number of clocks.
+    /// Damages an answer of the sensor; `before` is the previous burst if the answer is one. True if the sensor has seen a wrong number of
+    /// clocks.
     pub(crate) fn damage_answer(&mut self, answer: &mut [u8], before: Option<&[u8; BURST_BYTES]>) -> bool {
         self.invert(LineFault::AnswerBits, answer);
         let Some(before) = before else { return false };

@@ -32,7 +32,7 @@ impl LoggedBus {
         Self { bus, log, failure: Rc::default(), frame: Frame::default() }
     }
 
-    /// The latest error of writing the log; shared, so that it can be read after a driver has taken the bus.
+    /// The latest error of writing the log. It is shared, so that it can be read after a driver has taken the bus.
     pub(crate) fn failure(&self) -> Rc<RefCell<Option<io::Error>>> {
         Rc::clone(&self.failure)
     }
@@ -66,7 +66,7 @@ impl SpiDevice<u8> for LoggedBus {
         for operation in operations.iter() {
             match operation {
                 Operation::Read(words) => frame.miso.extend_from_slice(words),
-                // A write discards the answer; the log has zeros.
+                // A write discards the answer, and the log has zeros for it.
                 Operation::Write(words) => frame.miso.resize(frame.miso.len() + words.len(), 0),
                 Operation::Transfer(read, write) => {
                     let end = frame.miso.len() + read.len().max(write.len());

@@ -1,7 +1,7 @@
-//! A recording, replayed over an SPI bus to the real driver.
+//! Replay of a recording over an SPI bus to the real driver.
 //!
-//! Each burst of a frame log, or each row of a table as the burst that the part would have sent, is one transaction. The
-//! driver requests and decodes it as from a part; the decoded samples become the recording.
+//! Each burst of a frame log is one transaction; so is each row of a table, as the burst that the part would have sent.
+//! The driver requests and decodes it as from a part. The decoded samples are the recording.
 
 use crate::bus_timing::CapturedBusTiming;
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
@@ -20,13 +20,13 @@ use std::rc::Rc;
 pub struct Replay {
     /// The samples that the driver decoded.
     pub recording: Recording,
-    /// Number of transactions that were no burst reads; they are not decoded.
+    /// Number of transactions that were not burst reads; they are not decoded.
     pub other_transactions: u64,
-    /// The times on the bus, as far as the file says them.
+    /// The times on the bus, as far as the file has them.
     pub timing: CapturedBusTiming,
 }
 
-/// Replays a table of counts, a frame log or an export of a logic analyzer, told apart by the header of `file`.
+/// Replays a table of counts, a frame log or an export of a logic analyzer; the header of `file` tells which.
 ///
 /// # Errors
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
@@ -49,7 +49,7 @@ fn replay_table(file: &FileBytes, range: GyroRange) -> Result<Replay, InputError
         Ok(())
     })
     .map_err(|error| match &error.reason {
-        // No option says which column is which.
+        // No option assigns columns to channels here.
         Reason::Selection(selection) if matches!(**selection, SelectionError::NoChannel(_)) => {
             let told = "no known column; expected names such as gyro_x_counts";
             InputError { reason: Reason::other(told), ..error }
@@ -63,7 +63,7 @@ fn replay_table(file: &FileBytes, range: GyroRange) -> Result<Replay, InputError
 
 /// The range is `range` unless a write to SENS_AVG before the first burst selects another.
 fn replay_frames(file: &FileBytes, mut frames: FrameReader, range: GyroRange) -> Result<Replay, InputError> {
-    // As the log last selected it, and of the bursts so far.
+    // The range that the log selected last, and the range of the bursts so far.
     let (mut selected, mut taken_in) = (range, range);
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
     let mut player = Player::new();
@@ -117,7 +117,7 @@ impl Player {
         Self { driver: Adis16405::new(bus.clone(), NoDelay, Config::default()), bus }
     }
 
-    /// Lets the driver read one recorded transaction.
+    /// Makes the driver read one recorded transaction.
     fn burst(&mut self, mosi: &[u8], miso: &[u8]) -> Result<Burst, Reason> {
         self.bus.load(mosi, miso);
         self.driver.burst().map_err(|e| Reason::other(format!("replay over the bus: {e}")))
@@ -171,17 +171,17 @@ struct Recorded {
     played: bool,
 }
 
-/// A difference of the driver's transaction from the recorded one.
+/// The difference of the driver's transaction from the recorded one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ReplayError {
-    /// Nothing was loaded since the last transaction.
+    /// No transaction was loaded since the last one.
     NothingLoaded,
     /// A byte from the host differs from the recorded one.
     OtherRequest {
         /// Position in the transaction, from 0.
         at: usize,
     },
-    /// More or fewer bytes than were recorded.
+    /// The transaction has more or fewer bytes than the recorded one.
     OtherLength {
         /// Bytes recorded.
         recorded: usize,
@@ -244,7 +244,8 @@ impl SpiDevice<u8> for ReplayBus {
                     }
                 }
                 Operation::Transfer(read, write) => {
-                    // The shorter side is padded: zeros go out, surplus answers are dropped (rule of embedded-hal).
+                    // The shorter side is padded, as embedded-hal requires: zeros are sent, surplus answers are
+                    // dropped.
                     for i in 0..read.len().max(write.len()) {
                         let answer = recorded.exchange(at, write.get(i).copied().unwrap_or(0))?;
                         if let Some(word) = read.get_mut(i) {

@@ -1,29 +1,29 @@
-//! Fate of the samples, against the counts that the sensor had.
+//! Audit of the samples against the counts that the sensor had.
 
 use adis16405_driver::Burst;
 use firmware::{CHANNELS, Estimators};
 
-/// Counts the words of the estimated channels from the first one that was used on.
+/// Counts of words of the estimated channels, from the first used word on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SampleAudit {
-    /// Words that the device has received.
+    /// Words received.
     pub words: u64,
-    /// Those of them that are not the sensor's count, or that of a sample received before.
+    /// Wrong words: their count is not the sensor's, or is that of a sample received before.
     pub wrong: u64,
-    /// Wrong, and used.
+    /// Wrong words that were used.
     pub undetected: u64,
-    /// Largest difference of such a word of a gyro from the sensor's count.
+    /// Largest difference between a used word of a gyro and the sensor's count.
     pub worst_gyro: i32,
-    /// Right, and refused.
+    /// Right words that were refused.
     pub needless: u64,
     longest_gap_us: u64,
     latest_used_us: Option<u64>,
-    /// Number of the sample that was received last.
+    /// Number of the latest received sample.
     sample: u64,
 }
 
 impl SampleAudit {
-    /// Takes a burst that the estimators have just processed.
+    /// Adds a burst that the estimators have just processed.
     pub(crate) fn add(&mut self, received: &Received, now_us: u64, estimators: &Estimators<'_>) {
         let lengths = lengths(estimators);
         let used: Vec<bool> = lengths.iter().zip(received.lengths).map(|(now, before)| *now > before).collect();
@@ -49,25 +49,25 @@ impl SampleAudit {
         }
     }
 
-    /// The longest time without a sample that was used, that until now included, us.
+    /// The longest time without a used sample, including the time until now, µs.
     #[must_use]
     pub fn longest_gap_us(&self, now_us: u64) -> u64 {
         self.longest_gap_us.max(now_us - self.latest_used_us.unwrap_or(0))
     }
 }
 
-/// A burst that was received.
+/// A received burst.
 pub(crate) struct Received {
     /// The counts that the sensor had, and the number of the sample.
     pub(crate) sent: [i16; 12],
     pub(crate) sample: u64,
-    /// The burst that has arrived.
+    /// The burst that arrived.
     pub(crate) burst: Burst,
-    /// Samples that each channel had taken before.
+    /// Number of samples that each channel had before.
     pub(crate) lengths: [u64; CHANNELS.len()],
 }
 
-/// Samples that each channel has taken.
+/// Number of samples that each channel has.
 pub(crate) fn lengths(estimators: &Estimators<'_>) -> [u64; CHANNELS.len()] {
     std::array::from_fn(|index| estimators.channel(index).map_or(0, |estimator| estimator.len()))
 }

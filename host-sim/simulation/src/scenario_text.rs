@@ -1,7 +1,7 @@
-//! Effects, environment, faults and coefficients of a simulation as a person writes them: `KIND[:CHANNEL]:KEY=VALUE,…`, such as
+//! Text descriptions of effects, environment, faults and coefficients of a simulation: `KIND[:CHANNEL]:KEY=VALUE,…`, such as
 //! `sinusoid:gyro_z:frequency=20.5,amplitude=0.2`.
 //!
-//! Kinds, channels and keys have the names that the report gives them.
+//! Kinds, channels and keys are named as in the report.
 
 use crate::burst_order::output_register;
 use crate::fault_injector::FrameFault;
@@ -33,17 +33,17 @@ const ENVIRONMENT: &[&str] = &["temperature", "supply", "motion"];
 /// Kinds of faults.
 const FAULTS: &[&str] = &["impossible_rate", "shifted", "stuck_low", "stuck_high", "frozen", "stale", "low_supply"];
 
-/// Error in such a text.
+/// An error in such a text.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioTextError {
-    /// The kind is none of those known.
+    /// The kind is unknown.
     #[error("`{0}` is none of {1}")]
     Kind(String, String),
     /// The channel does not exist, or the kind needs one.
     #[error("`{0}` is no channel: it needs one such as gyro_x or accl_z, or several with + between them")]
     Channel(String),
-    /// A text between commas is no `KEY=VALUE`.
+    /// A text between commas is not `KEY=VALUE`.
     #[error("`{0}` is not of the form KEY=VALUE")]
     Pair(String),
     /// A key is missing.
@@ -53,7 +53,7 @@ pub enum ScenarioTextError {
         kind: String,
         /// The key.
         key: &'static str,
-        /// Keys that are given and not of the kind, or not yet read.
+        /// Keys that are given but unknown or not yet read.
         given: Vec<String>,
     },
     /// A key or a channel is named twice.
@@ -71,7 +71,7 @@ pub enum ScenarioTextError {
         kind: String,
         /// The key.
         key: String,
-        /// The keys that it has.
+        /// The keys of the kind.
         known: Vec<&'static str>,
     },
     /// A value is out of range.
@@ -92,7 +92,7 @@ impl Simulation {
     /// Adds an effect, such as `temperature:gyro_x:sensitivity=0.05` or `dropped_samples:fraction=0.01`.
     ///
     /// # Errors
-    /// The text is none of an effect.
+    /// The text does not describe an effect.
     pub fn add_effect(&mut self, text: &str) -> Result<()> {
         let mut fields = Fields::new(text, EFFECTS)?;
         let effect = effect(&mut fields)?;
@@ -101,10 +101,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Changes a part of the environment, such as `temperature:rise=8,time_constant=900` in °C and s.
+    /// Changes a part of the environment, such as `temperature:rise=8,time_constant=900`, in °C and s.
     ///
     /// # Errors
-    /// The text is none of an environment.
+    /// The text does not describe a part of the environment.
     pub fn set_environment(&mut self, text: &str) -> Result<()> {
         let mut fields = Fields::new(text, ENVIRONMENT)?;
         let environment = &mut self.scenario.environment;
@@ -134,7 +134,7 @@ impl Simulation {
     /// Adds a fault of the bus, such as `stuck_low:from=10,bursts=5`: five bursts from 10 s on.
     ///
     /// # Errors
-    /// The text is none of a fault.
+    /// The text does not describe a fault.
     pub fn add_fault(&mut self, text: &str) -> Result<()> {
         let mut fields = Fields::new(text, FAULTS)?;
         let fault = match fields.kind {
@@ -154,10 +154,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Sets the taps of each of the filter's two stages: 1, which is no filter, 2, 4, 8, 16, 32 or 64.
+    /// Sets the number of values that each of the filter's two stages averages: 1 (no filter), 2, 4, 8, 16, 32 or 64.
     ///
     /// # Errors
-    /// Another number.
+    /// The number is another one.
     pub fn set_taps(&mut self, taps: u32) -> Result<()> {
         if !taps.is_power_of_two() || taps > 64 {
             let (key, value) = ("taps".to_owned(), taps.to_string());
@@ -256,7 +256,7 @@ struct Fields<'a> {
     kind: &'a str,
     channel: Option<&'a str>,
     values: BTreeMap<&'a str, &'a str>,
-    /// Keys that the kind has.
+    /// Keys of the kind.
     known: Vec<&'static str>,
 }
 
@@ -346,7 +346,7 @@ impl<'a> Fields<'a> {
         Ok(())
     }
 
-    /// Refuses what no one has asked for.
+    /// Returns an error for keys and channels that the kind does not have.
     fn finish(self) -> Result<()> {
         let Some(&key) = self.values.keys().next().or(self.channel.as_ref()) else { return Ok(()) };
         Err(ScenarioTextError::Unknown { kind: self.kind.to_owned(), key: key.to_owned(), known: self.known })

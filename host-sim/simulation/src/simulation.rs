@@ -1,4 +1,4 @@
-//! The virtual sensor, read by the real driver over the emulated bus into a recording.
+//! A simulation: the real driver reads the virtual sensor over the emulated bus into a recording.
 
 use crate::fault_injector::{FaultEnd, FaultyBus, FrameFault};
 use crate::logged_bus::{LoggedBus, seconds};
@@ -18,13 +18,13 @@ use virtual_sensor::{
     TemperatureProfile, VirtualAdis16405,
 };
 
-/// Sample rate, Hz: that of the published characterisation which [`Simulation::paper`] reproduces.
+/// Sample rate of the published characterisation that [`Simulation::paper`] reproduces, Hz.
 pub const SAMPLE_RATE_HZ: f64 = 204.8;
 
-/// Longest simulation, s: a day, which is about 1 GB of samples.
+/// Longest simulation, s: one day, which is about 1 GB of samples.
 pub const LONGEST_S: f64 = 86_400.0;
 
-/// The random stream of the host clock; those below belong to the part.
+/// The random stream of the host clock; lower ones belong to the part.
 const HOST_STREAM: u64 = 1 << 32;
 
 /// A simulation: the part, its scenario, and the host that reads it.
@@ -48,18 +48,18 @@ pub struct Simulation {
     pub faults: Vec<TimedFault>,
 }
 
-/// A fault of the bus that begins at some time and damages so many bursts.
+/// A fault of the bus that begins at some time and damages a number of bursts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedFault {
-    /// Its beginning, s of virtual time.
+    /// Start of the fault, s of virtual time.
     pub from_s: f64,
     /// The damage.
     pub fault: FrameFault,
-    /// Bursts that it damages.
+    /// Number of bursts that it damages.
     pub bursts: u32,
 }
 
-/// The host's time stamps of the data-ready pulses.
+/// The clock with which the host time-stamps the data-ready pulses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HostClock {
     /// Mean of the exponentially distributed time from a pulse to its time stamp, s.
@@ -75,7 +75,7 @@ impl Default for HostClock {
     }
 }
 
-/// The reason why a simulation gave no recording.
+/// The reason for which a simulation gave no recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulationError {
@@ -124,8 +124,8 @@ impl Simulation {
         }
     }
 
-    /// The same part in the default scenario of the command: a spectral line on gyro z, as of a motor nearby, and a gyro x
-    /// that follows the temperature while the part warms up.
+    /// [`paper`](Self::paper) with the default scenario of the command: gyro z has a spectral line, as of a motor
+    /// nearby, and gyro x follows the temperature while the part warms up.
     pub fn demonstration(seconds: f64, seed: u64) -> Self {
         let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 900.0, cycle_c: 1.0, period_s: 700.0 };
         let supply = SupplyProfile { load_v: 0.05, cycle_v: 0.02, ..SupplyProfile::default() };
@@ -143,7 +143,7 @@ impl Simulation {
     /// Number of samples that the part takes.
     ///
     /// # Errors
-    /// The duration is not positive, not finite or above [`LONGEST_S`], or the rate is none that the part has.
+    /// The duration is not positive, not finite or above [`LONGEST_S`], or the part does not have the rate.
     pub fn samples(&self) -> Result<u64, SimulationError> {
         if self.seconds > 0.0 && self.seconds <= LONGEST_S {
             Ok((self.seconds * self.sampled_hz()?).round() as u64)
@@ -173,7 +173,7 @@ impl Simulation {
     /// Runs the simulation and writes every transaction to the frame log `file`.
     ///
     /// # Errors
-    /// As [`run`](Self::run), or the log cannot be written.
+    /// Those of [`run`](Self::run), or the log cannot be written.
     pub fn run_logged(&self, file: &Path, progress: impl FnMut(u64)) -> Result<Recording, SimulationError> {
         let samples = self.samples()?;
         let fail = |reason| SimulationError::Log { file: file.to_owned(), reason };
@@ -191,15 +191,15 @@ impl Simulation {
         recording
     }
 
-    /// The bus and the part on it, with the fastest clock for bursts in the part's clock mode: 1 MHz, or 300 kHz in low-power
-    /// mode, which slow rates select.
+    /// The bus with the part, and the fastest clock for bursts in the part's clock mode: 1 MHz, or 300 kHz in low-power mode, which slow
+    /// rates select.
     fn bus(&self) -> Result<EmulatedBus, SimulationError> {
         let mode = SamplePeriod::nearest(self.rate_hz).map_err(SimulationError::Config)?.clock_mode();
         let part = VirtualAdis16405::with_scenario(&self.scenario, self.noise.clone(), self.seed);
         Ok(EmulatedBus::with_sck_hz(part, mode.max_burst_sck_hz()))
     }
 
-    /// Reads `samples` samples through `device`, which is `faulty` or the logged one over it.
+    /// Reads `samples` samples through `device`, which is `faulty` or logs it.
     fn read<SPI: SpiDevice<u8>>(
         &self,
         faulty: &FaultyBus,
@@ -250,14 +250,14 @@ struct TimeStamps {
 }
 
 impl TimeStamps {
-    /// `missed_fraction` of the samples, 0 to 1, are missed at random.
+    /// `missed_fraction` is the fraction of samples that are missed at random, 0 to 1.
     fn new(clock: HostClock, missed_fraction: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(HOST_STREAM);
         Self { clock, missed_fraction, random, latest_s: 0.0 }
     }
 
-    /// The time stamp of the sample that was ready at `ready_ns`, s; `None` if the host misses the sample.
+    /// The time stamp of the sample that was ready at `ready_ns`, in s; `None` if the host misses the sample.
     fn next(&mut self, ready_ns: u64) -> Option<f64> {
         if self.random.random_bool(self.missed_fraction) {
             return None;
@@ -269,7 +269,7 @@ impl TimeStamps {
             self.clock.latency_s * latency
         };
         let stamp_s = (seconds(ready_ns) + latency_s) * self.clock.clock_ratio;
-        // Delayed samples queue: no time stamp is earlier than the one before.
+        // Delayed samples queue, so no time stamp is earlier than the one before.
         self.latest_s = self.latest_s.max(stamp_s);
         Some(self.latest_s)
     }

@@ -1,14 +1,14 @@
-//! Attacks of a port on the device: seeded sequences of commands, whole, wrong and damaged, at every rate and in any order. None of
-//! them stops it, none writes the sensor's flash without being armed, and it takes the settings that it is given afterwards.
+//! Attacks on the device through its port: seeded sequences of commands, valid, invalid and damaged, at every rate and in any order. None
+//! stops the device or writes the sensor's flash without being armed. Afterwards the device accepts settings.
 
 use link::{BootCause, Decoder, Health, Hello, Message, Received};
 use simulation::Device;
 use std::fmt::Write as _;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// Sequences of commands.
+/// Number of sequences of commands.
 const SEQUENCES: u64 = 60;
-/// Commands of each.
+/// Commands per sequence.
 const COMMANDS: u32 = 40;
 
 /// A linear congruential generator (Knuth's MMIX constants).
@@ -25,7 +25,7 @@ impl Random {
     }
 }
 
-/// Numbers at and beyond the ends of what commands take.
+/// Numbers at and beyond the limits of the commands.
 const NUMBERS: [&str; 20] = [
     "0",
     "1",
@@ -48,7 +48,7 @@ const NUMBERS: [&str; 20] = [
     "4294968",
     ".",
 ];
-/// Words that act, but those that arm a write to the sensor's flash, restart the device, or start the boot loader.
+/// Words that act, without those that arm a write to the sensor's flash, restart the device, or start the boot loader.
 const WORDS: [&str; 13] = [
     "check",
     "deflect",
@@ -91,7 +91,7 @@ const REGISTERS: [&str; 24] = [
     "ff",
 ];
 
-/// A command, or something like one.
+/// A command, a damaged one, or random bytes.
 fn command(random: &mut Random) -> Vec<u8> {
     let mut text = String::new();
     let _ = match random.below(10) {
@@ -105,7 +105,7 @@ fn command(random: &mut Random) -> Vec<u8> {
     };
     let mut bytes = text.into_bytes();
     match random.below(8) {
-        // Bytes that belong to nothing; they end with the line.
+        // Random bytes, which end with the line.
         0 => bytes.extend((0..random.below(80)).map(|_| random.below(256) as u8).chain([b'\r'])),
         // A byte is lost or damaged.
         1 if !bytes.is_empty() => drop(bytes.remove(random.below(bytes.len() as u64) as usize)),
@@ -118,7 +118,7 @@ fn command(random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Hello, health and the lines of what the device has sent since; the stream must be whole.
+/// Hello, health and the lines that the device has sent since the last call; the stream must be undamaged.
 fn hear(bytes: &[u8]) -> (Option<Hello>, Option<Health>, Vec<String>) {
     let (mut decoder, mut hello, mut health, mut lines) = (Decoder::new(), None, None, Vec::new());
     for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
@@ -134,7 +134,7 @@ fn hear(bytes: &[u8]) -> (Option<Hello>, Option<Health>, Vec<String>) {
     (hello, health, lines)
 }
 
-/// A device whose commands come with the seconds.
+/// A device that receives commands at times.
 struct Session {
     device: Device,
     now_us: u64,
@@ -149,12 +149,12 @@ impl Session {
 
     fn send(&mut self, keys: &[u8], wait_us: u64) -> Vec<u8> {
         self.device.press(keys);
-        // Commands take time on the bus: the wait begins when they have been executed.
+        // Commands take time on the bus, so the wait begins after they were executed.
         self.now_us = self.now_us.max(self.device.bus().part().now() / 1000) + wait_us;
         self.device.run_until(self.now_us)
     }
 
-    /// Writes of the sensor's flash so far, by its register FLASH_CNT.
+    /// Number of flash writes of the sensor so far, by its register FLASH_CNT.
     fn flash_writes(&mut self) -> u16 {
         let (_, _, lines) = hear(&self.send(b"\rpeek flash_cnt\r", 200_000));
         let line = lines.iter().rev().find(|line| line.starts_with("FLASH_CNT")).expect("the sensor answers");
@@ -162,7 +162,7 @@ impl Session {
     }
 }
 
-/// The settings of a first start, whatever was set before.
+/// Commands that restore the settings of a first start.
 const SETTINGS: &[u8] = b"\rbus usual\re 0\ri 0\rw 0\rforget\rg 300\rn 0\rf 204.8\rp 0\r";
 
 #[test]
@@ -178,7 +178,7 @@ fn no_sequence_of_commands_stops_or_misconfigures_the_device() {
             session.send(&keys, wait_us);
             commands += 1;
         }
-        // A sensor that was put to sleep, or to another pin, is recovered step by step, one a second.
+        // A sensor that was put to sleep, or to another pin, is recovered by one step per second.
         session.send(SETTINGS, 12_000_000);
         let sent = session.send(b"clear\r", 2_000_000);
         hear(&sent);
@@ -202,10 +202,10 @@ fn no_sequence_of_commands_stops_or_misconfigures_the_device() {
     println!("{commands} commands in {SEQUENCES} sequences");
 }
 
-/// Every bit of GLOB_CMD by which the sensor writes its flash waits for `arm`, which holds for one of them and for ten seconds.
+/// Each bit of GLOB_CMD that writes the sensor's flash needs `arm`, which is valid for one write and ten seconds.
 #[test]
-fn what_writes_the_flash_of_the_sensor_needs_arming() {
-    // Auto-null, factory restore and flash update (data sheet Rev. B, pages 10 and 13); with other bits, too.
+fn a_write_to_the_flash_of_the_sensor_needs_arming() {
+    // Auto-null, factory restore and flash update (data sheet Rev. B, pages 10 and 13), also with other bits.
     for value in ["1", "2", "8", "0009"] {
         let mut session = Session::new(3);
         session.send(b"i 0\r", 1_000_000);

@@ -55,7 +55,7 @@ impl Transcript {
             .expect("a report")
     }
 
-    /// Number of reports, each of hello, eight channels and health; other messages are left out.
+    /// Number of reports, each of hello, eight channels and health; other messages are not counted.
     fn reports(&self) -> usize {
         let extra = |message: &&Message| {
             matches!(message, Message::Log(_) | Message::Raw(_) | Message::Validation(_) | Message::Learned(_))
@@ -73,7 +73,7 @@ impl Transcript {
     }
 }
 
-/// Sends `keys`, then runs to `until_us`.
+/// Sends `keys`, then runs until `until_us`.
 fn after(device: &mut Device, keys: &str, until_us: u64) -> Transcript {
     device.press(keys.as_bytes());
     hear(&device.run_until(until_us))
@@ -128,7 +128,8 @@ fn rate_range_and_filter_are_set_or_refused_with_the_reason() {
     assert_eq!(after(&mut device, "\rr", until).health().bad_commands, 2);
 }
 
-/// Rates of low-power mode need a serial clock of 300 kHz at most, and a longer stall until the sensor has left that mode.
+/// Rates of low-power mode need a serial clock of at most 300 kHz, and a longer stall until the sensor has left the
+/// mode.
 #[test]
 fn the_serial_clock_follows_the_rate() {
     let mut device = device();
@@ -142,21 +143,21 @@ fn the_serial_clock_follows_the_rate() {
         assert_eq!(hello.spi_clock_hz, clock_hz, "{rate_hz} Hz");
         assert!((hello.sample_rate_hz / rate_hz - 1.0).abs() < 0.02 && hello.sampling, "{hello:?}");
         assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{rate_hz} Hz: {health:?}");
-        // The report is made a second before the end. Beside the first half second and a sample period.
+        // The report is made a second before the end; the first half second and a sample period are not counted.
         let least = rate_hz * (f64::from(end - at) - 1.5) - 1.0;
         assert!(f64::from(health.used + health.settling) > least, "{rate_hz} Hz: {health:?}");
     }
     assert_eq!(device.bus().part().violations(), []);
 }
 
-/// The numbers of a cell, and the words around them.
+/// The numbers of a table cell, without the words around them.
 fn numbers(text: &str) -> Vec<f64> {
     text.split(|letter: char| !(letter.is_ascii_digit() || letter == '.'))
         .filter_map(|word| word.trim_matches('.').parse().ok())
         .collect()
 }
 
-/// The table has the numbers of the frames, in its units, with the rounding that its bounds support.
+/// The table has the numbers of the frames, in its own units, with the digits that the bounds support.
 #[test]
 fn the_table_shows_the_numbers_of_the_report() {
     let mut device = device();
@@ -178,7 +179,7 @@ fn the_table_shows_the_numbers_of_the_report() {
     };
     let (gyros, accelerometers) = (place("        deg/sqrt(s)") + 1, place(" accel  ug/sqrt(Hz)") + 1);
     assert!(gyros < accelerometers && accelerometers < place("Allan deviation"), "{lines:#?}");
-    // From deg/s and g: the columns begin where their titles do.
+    // The frames are in deg/s and g. The columns of the table begin at their titles.
     let columns = ["angle random walk", "bias instability", "rate random walk", "error on"];
     let starts = columns.map(|title| lines[gyros - 2].find(title).expect(title));
     for (index, report) in channels[..6].iter().enumerate() {
@@ -192,7 +193,7 @@ fn the_table_shows_the_numbers_of_the_report() {
             let cell = line.get(starts[k]..(starts[k + 1].min(line.len()))).unwrap_or_default().trim();
             let found = numbers(&cell.replace(',', ""));
             let (value, low, high) = (factor * coefficient.value, factor * coefficient.low, factor * coefficient.high);
-            // Two significant digits at least: 5 % off at most, for 1.05 that is written 1.1.
+            // Numbers have at least two significant digits: an error of at most 5 %, for 1.05 written as 1.1.
             let near = |shown: f64, of: f64| (shown - of).abs() <= 0.05 * of.abs();
             let is_right = match found[..] {
                 [bound] if cell.starts_with('<') => near(bound, high),
@@ -212,11 +213,11 @@ fn the_table_shows_the_numbers_of_the_report() {
         for (index, report) in channels[..6].iter().enumerate() {
             let of = report.octaves[k];
             let n = point.n as f64;
-            // 0.05 deg/s and 3.33 mg are the data sheet's.
+            // The data sheet gives 0.05 deg/s and 3.33 mg a count.
             let unit = if index < 3 { 0.05 } else { 3.33 };
             let deviation = unit * (of.sum as f64 / (2.0 * n * n * of.count as f64)).sqrt();
             assert!((cells[0] * 204.8 / n - 1.0).abs() < 1e-3, "{}", lines[curve + k]);
-            // Four significant digits.
+            // The deviations have four significant digits.
             assert!((cells[1 + index] / deviation - 1.0).abs() < 0.6e-3, "{deviation}: {}", lines[curve + k]);
         }
     }
@@ -244,7 +245,7 @@ fn commands_show_help_status_version_and_counters() {
     }
 }
 
-/// Keys in quick succession are all answered, in order; those beyond the queue are answered with "busy".
+/// Keys in quick succession are answered in order; those beyond the queue are answered with "busy".
 #[test]
 fn queued_keys_are_answered_in_order() {
     let mut device = device();
@@ -277,7 +278,7 @@ fn the_raw_stream_is_complete() {
         .flat_map(|raw| &raw.bursts)
         .map(|burst| OutputWord(u16::from_be_bytes(burst.words[1])).counts(Channel::GyroX))
         .collect();
-    // The counts of the same part, sample by sample.
+    // A part with the same seed gives the counts sample by sample.
     let mut twin = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 1), Device::blank_memory());
     after(&mut twin, "", SECOND);
     let mut expected = Vec::new();
@@ -295,8 +296,8 @@ fn the_raw_stream_is_complete() {
     assert!(after(&mut device, "w0\r", 6 * SECOND).messages.len() <= 1, "the stream ends");
 }
 
-/// A reset of the sensor that the firmware did not command: its samples with other settings are not used, it is
-/// configured again, and the statistics go on with a gap.
+/// The sensor is reset, but not by the firmware. Samples with other settings are not used, the sensor is configured
+/// again, and the statistics go on with a gap.
 #[test]
 fn a_sensor_that_was_reset_is_configured_again() {
     let mut device = device();
@@ -315,10 +316,10 @@ fn a_sensor_that_was_reset_is_configured_again() {
     assert!(u64::from(health.used + lost).abs_diff((6.0 * 204.8) as u64) < 10 + 10, "{health:?}");
 }
 
-/// An epoch accumulates, reports, fits its model and begins again. From the second on, the model of the one before is
-/// checked.
+/// An epoch accumulates, reports, fits its model and begins again. From the second one on, the model of the previous
+/// epoch is validated.
 #[test]
-fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
+fn an_epoch_ends_with_a_report_and_its_model_is_validated_on_the_next() {
     let mut device = device();
     let heard = after(&mut device, "i0\re20\r", 61 * SECOND);
     assert_eq!(heard.reports(), 3);
@@ -332,11 +333,11 @@ fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
     for (index, report) in channels.iter().enumerate() {
         let inertial = index % 8 < 6;
         assert_eq!(report.unseen_error.is_some(), index >= 8 && inertial, "{report:?}");
-        // From the first 32 samples the gate against gross errors learns.
+        // The gate against gross errors learns from the first 32 samples.
         let learning = if index < 8 { 32 } else { 0 };
         assert!((report.samples + learning).abs_diff(20 * 2048 / 10) < 40, "{}", report.samples);
         if let Some(error) = report.unseen_error {
-            // 1 is expected of a true model, with a spread of the same size: 10 octaves that hang together.
+            // A true model has an expected deviance of 1, with a spread of the same size: 10 correlated octaves.
             assert!((0.0..5.0).contains(&error.deviance_per_point), "{error:?}");
             assert!((0.0..30.0).contains(&error.rms_percent), "{error:?}");
         }
@@ -352,7 +353,7 @@ fn the_statistics_are_reset_on_command() {
     assert!((190..=210).contains(&health.used), "{health:?}");
 }
 
-/// A restart keeps settings and statistics: the samples go on, and the configuration is that which was set.
+/// A restart keeps settings and statistics: the samples go on with the same configuration.
 #[test]
 fn a_restart_keeps_statistics_and_settings() {
     let memory = Device::blank_memory();
@@ -380,8 +381,8 @@ fn a_restart_keeps_statistics_and_settings() {
 /// XGYRO_OFF = −100, byte by byte (data sheet Rev. B, table 8: address 0x1A, 13 bits).
 const NEGATIVE_BIAS: [u16; 2] = [0x9A9C, 0x9B1F];
 
-/// The part's erratum: a negative bias of gyro x in the sensor would cost every burst the sign of negative rates. The
-/// firmware takes that bias out of the sensor before it uses samples.
+/// The part's erratum: with a negative bias of gyro x in the sensor, each burst would lose the sign of negative rates.
+/// The firmware moves the bias out of the sensor before it uses samples.
 #[test]
 fn a_negative_x_bias_in_the_sensor_costs_no_sample() {
     let mut part = VirtualAdis16405::new(NoiseModel::paper(), 11);
@@ -398,8 +399,8 @@ fn a_negative_x_bias_in_the_sensor_costs_no_sample() {
     assert_eq!(health.used, health.bursts, "{health:?}");
 }
 
-/// Epochs of a minute with restarts in them end a minute after they began, but for the time that the restarts take: 0.8 s since
-/// the last checkpoint each.
+/// Epochs of a minute contain restarts and still end a minute after they began, except for the time that a restart takes: up to 0.8 s since
+/// the last checkpoint.
 #[test]
 fn an_epoch_keeps_its_age_over_a_restart() {
     let memory = Device::blank_memory();
@@ -420,7 +421,7 @@ fn an_epoch_keeps_its_age_over_a_restart() {
     assert_eq!(epochs, [0], "the first epoch has ended within 62 s");
 }
 
-/// A part that answers 3 in the place of its number is found only if that is asked for, and then also after a restart.
+/// A part with another product number, 3, is used only on request, then also after a restart.
 #[test]
 fn a_part_with_another_prod_id_is_used_if_asked_for() {
     let memory = Device::blank_memory();
@@ -446,9 +447,9 @@ fn a_part_with_another_prod_id_is_used_if_asked_for() {
     assert!(heard.logs().iter().any(|log| log.contains("PROD_ID answered 3")), "{:?}", heard.logs());
 }
 
-/// A gyro whose self-test fails, as in motion, is marked in the report and in the table, and all samples are used.
+/// A gyro whose self-test fails, as in motion, is marked in the report and in the table. All samples are used.
 #[test]
-fn a_failed_self_test_is_no_gate() {
+fn a_failed_self_test_excludes_no_sample() {
     let mut part = VirtualAdis16405::new(NoiseModel::paper(), 1);
     part.break_sensor(OutputRegister::GyroY);
     let mut device = Device::new(part, Device::blank_memory());
@@ -473,8 +474,7 @@ fn a_failed_self_test_is_no_gate() {
     assert!(f64::from(health.used + health.settling) > 3.8 * 204.8, "{health:?}");
 }
 
-/// For an hour the host does not read the USB port: its output is lost there, and nothing else. No sample, no restart, no message
-/// of the UART.
+/// For an hour the host does not read the USB port. Only its output is lost: no sample, no restart, no message of the UART.
 #[test]
 fn an_unread_usb_port_costs_its_output_alone() {
     const HOUR: u64 = 3600 * SECOND;
@@ -489,13 +489,12 @@ fn an_unread_usb_port_costs_its_output_alone() {
     assert!(f64::from(health.used) > 3599.0 * 204.8, "{health:?}");
     let streamed = heard.messages.iter().filter(|message| matches!(message, Message::Raw(_))).count();
     assert!(streamed as f64 > 3599.0 * 204.8 / 16.0, "{streamed} messages of the raw stream");
-    // The queue holds some kB of the 20 MB that the UART has sent.
+    // The queue holds a few kB of the 20 MB that the UART has sent.
     let sent = heard.messages.len() + heard.lines.len();
     assert!((sent as u32 - 100..sent as u32 + 100).contains(&health.usb_dropped), "{} of {sent}", health.usb_dropped);
 }
 
-/// Settings, the raw stream, and the models of the last epoch are kept over a loss of power, which takes everything else; `forget`
-/// erases them.
+/// Settings, the raw stream and the models of the last epoch survive a loss of power; everything else is lost. `forget` erases them.
 #[test]
 fn settings_and_models_survive_the_loss_of_power() {
     let part = || VirtualAdis16405::new(NoiseModel::paper(), 5);
@@ -514,7 +513,7 @@ fn settings_and_models_survive_the_loss_of_power() {
     assert_eq!((hello.epoch, hello.epoch_s, hello.boot.starts), (0, 20, 1), "{hello:?}");
     assert_eq!(heard.reports(), 1, "every 7 s");
     assert!(heard.messages.iter().any(|message| matches!(message, Message::Raw(_))), "the stream goes on");
-    // The models of before are validated on the first epoch after.
+    // The earlier models are validated on the first epoch after the loss.
     let heard = hear(&again.run_until(30 * SECOND));
     let validated = heard.messages.iter().filter(|message| matches!(message, Message::Validation(_))).count();
     assert_eq!(validated, 6);
@@ -531,7 +530,7 @@ fn settings_and_models_survive_the_loss_of_power() {
     assert!(!heard.messages.iter().any(|message| matches!(message, Message::Raw(_))));
 }
 
-/// The samples that a write costs are a gap: lost and counted, and no reason to probe the sensor.
+/// The samples lost during a write are a gap: they are counted, and the sensor is not probed.
 #[test]
 fn a_write_costs_a_gap_and_no_probe() {
     let mut device = device();
@@ -544,12 +543,12 @@ fn a_write_costs_a_gap_and_no_probe() {
     );
     let health = *after(&mut device, "r", 5 * SECOND).health();
     assert_eq!((health.recoveries, health.rereads, health.suspect), (0, 0, 0), "{health:?}");
-    // 50 ms at 204.8 SPS.
+    // A write takes 50 ms, at 204.8 SPS.
     assert!((10..=11).contains(&health.lost_edges), "{health:?}");
     assert_eq!(health.used, health.bursts);
 }
 
-/// A part that turns by 2 deg/s about each axis: its correction of x is negative, and is not applied, as bursts would lose the sign of x.
+/// The part turns by 2 deg/s about each axis. Its correction of x is negative and not applied, since bursts would lose the sign of x.
 #[test]
 fn autonull_says_what_it_does_not_apply() {
     for (rate, told) in
@@ -567,7 +566,7 @@ fn autonull_says_what_it_does_not_apply() {
             // 0.0125 deg/s a count (data sheet Rev. B, Table 8).
             assert_eq!(x, "-160 counts not applied by the part");
         }
-        // The correction is applied: the samples of y and z are 0 now, and those of x too if its correction was positive.
+        // The correction is applied: the samples of y and z are 0, and those of x too if its correction is positive.
         let [_, x, y, z, ..] = *device.bus().part().counts();
         let applied = if rate < 0.0 { [x, y, z] } else { [0, y, z] };
         assert!(applied.iter().all(|count| count.abs() <= 1), "{applied:?}");
@@ -575,7 +574,7 @@ fn autonull_says_what_it_does_not_apply() {
     }
 }
 
-/// The load figures, for which the stack is searched, are read once for an answer of some thirty lines.
+/// An answer of some thirty lines reads the load figures once, since reading them searches the stack.
 #[test]
 fn the_counters_are_read_once_for_an_answer() {
     let mut device = device();
@@ -583,6 +582,6 @@ fn the_counters_are_read_once_for_an_answer() {
     let before = device.meter_readings();
     let lines = after(&mut device, "k", 2 * SECOND + 1000).lines;
     assert!(lines.iter().any(|line| line.starts_with("settling ")), "{lines:?}");
-    // And once a second for the log of a debug probe.
+    // The log of a debug probe reads them once a second.
     assert!(device.meter_readings() - before <= 2, "{} times", device.meter_readings() - before);
 }

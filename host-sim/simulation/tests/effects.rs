@@ -1,4 +1,4 @@
-//! Each effect against its definition: moments and covariances from the textbook formulas, at seeds fixed in advance.
+//! Each effect against its definition: moments and covariances by textbook formulas, with fixed seeds.
 
 use adis16405_driver::{Channel, Faults};
 use recordings::recording::Recording;
@@ -11,7 +11,7 @@ use virtual_sensor::{
 const PERIOD_S: f64 = 0.01;
 const GYRO: OutputRegister = OutputRegister::GyroX;
 
-/// `count` values of gyro X with `effect` and nothing else.
+/// `count` values of all channels with `effect` as the only disturbance.
 fn values(effect: InjectedEffect, environment: Environment, seed: u64, count: usize) -> Vec<[f64; 12]> {
     let mut source = EffectSource::new(&SensorScenario { environment, effects: vec![effect] }, seed);
     (0..count)
@@ -31,7 +31,7 @@ fn covariance(values: &[f64], lag: usize) -> f64 {
     values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / (values.len() - lag) as f64
 }
 
-/// Simulates a still part, without noise or with that of the paper.
+/// Simulates a part at rest, without noise or with that of the paper.
 fn record(noise: NoiseModel, effects: Vec<InjectedEffect>, seconds: f64) -> Recording {
     let scenario = SensorScenario { effects, ..SensorScenario::default() };
     Simulation { noise, scenario, ..Simulation::paper(seconds, 5) }.run(|_| ()).unwrap()
@@ -85,7 +85,8 @@ fn spikes_are_single_and_as_frequent_as_they_say() {
     let spikes = gyro(InjectedEffect::Spikes { channel: GYRO, rate_per_hour: 3600.0, size: 4.0 }, 400_000);
     let up = spikes.iter().filter(|value| **value == 4.0).count() as f64;
     let down = spikes.iter().filter(|value| **value == -4.0).count() as f64;
-    // One a second: a Poisson number of mean 4000 less the 0.5 % that fall on another, six deviations.
+    // Spikes come once a second: a Poisson number of mean 4000, less the 0.5 % that coincide. The tolerance is six
+    // deviations.
     assert!((up + down - 3980.0).abs() < 6.0 * 4000f64.sqrt(), "{up} up, {down} down");
     assert!((up - down).abs() < 6.0 * 4000f64.sqrt());
     assert_eq!(up as usize + down as usize + spikes.iter().filter(|value| **value == 0.0).count(), spikes.len());
@@ -110,7 +111,7 @@ fn sensitivities_multiply_what_the_outputs_show() {
         let expected: f64 = force.iter().zip(sensitivity).map(|(force, per_g)| force * per_g).sum();
         assert!((moved[gyro] - expected).abs() < 1e-12);
     }
-    // 500 s of the warm-up of 600 s, and 5/9 of the room's cycle of 900 s.
+    // Time 500 s is in a warm-up of 600 s, and 5/9 of the room's cycle of 900 s.
     let expected = 6.0 * (1.0 - (-499.99f64 / 600.0).exp()) + (2.0 * std::f64::consts::PI * 499.99 / 900.0).sin();
     assert!((warm[49_999][OutputRegister::Temp as usize] - expected).abs() < 1e-9);
 }
@@ -127,7 +128,7 @@ fn a_common_mode_is_the_same_in_every_channel() {
 
 #[test]
 fn a_quantized_angle_has_the_allan_variance_of_quantization_noise() {
-    // White noise dithers the angle: its step of a sample is half as large as the quantum.
+    // White noise dithers the angle: its step per sample is half a quantum.
     let coefficient = 0.2 * PERIOD_S;
     let quantum = 12f64.sqrt() * coefficient;
     let mut noise = NoiseModel::noiseless();
@@ -150,8 +151,8 @@ fn a_quantized_angle_has_the_allan_variance_of_quantization_noise() {
         error += (shown - rate) * PERIOD_S;
         errors.push(error);
     }
-    // σ² = 3Q²/τ² is that of an angle error that is white with variance Q²: the lag-1 correlation that is left at a step
-    // of half a quantum is 6/π²·exp(−2π²/4) = 0.4 %.
+    // σ² = 3Q²/τ² is that of a white angle error with variance Q². At a step of half a quantum the lag-1 correlation is
+    // 6/π²·exp(−2π²/4) = 0.4 %.
     let tolerance = 6.0 * coefficient * coefficient / (errors.len() as f64).sqrt();
     assert!((covariance(&errors, 0) / (coefficient * coefficient) - 1.0).abs() < 0.01);
     assert!((covariance(&errors, 1) / (coefficient * coefficient) - 0.0044).abs() < tolerance.max(0.014));
@@ -179,7 +180,8 @@ fn the_filter_reduces_the_variance_as_a_triangle_does() {
         let counts = counts(recording, GYRO);
         counts.windows(9).map(|window| (window[8] - window[0]).powi(2)).sum::<f64>() / (counts.len() - 8) as f64
     };
-    // Two averages of 4: weights 1 2 3 4 3 2 1 over 16, squares 44/256. Samples 8 apart share no input.
+    // Two averages of 4 have the weights 1 2 3 4 3 2 1 over 16, whose squares sum to 44/256. Samples 8 apart share no
+    // input.
     let ratio = difference_variance(&filtered) / difference_variance(&plain);
     assert!((ratio / (44.0 / 256.0) - 1.0).abs() < 0.05, "{ratio}");
 }

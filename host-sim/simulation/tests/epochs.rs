@@ -1,4 +1,4 @@
-//! The loop on the device: one epoch fits a model, the next one checks it on data that the fit has not seen.
+//! The loop on the device: one epoch fits a model, and the next one validates it on unseen data.
 
 use adis16405_driver::Channel;
 use embedded_hal::spi::SpiDevice;
@@ -17,7 +17,8 @@ const SEED: u64 = 1;
 /// Sensitivity of gyro x to the temperature, °/s/°C.
 const SENSITIVITY: f64 = 0.05;
 
-/// A part that warms up by 8 °C in a room with a temperature cycle of 20 s; with `with_effect` its gyro x follows it.
+/// A part that warms up by 8 °C in a room with a temperature cycle of 20 s. If `with_effect`, its gyro x follows the
+/// temperature.
 fn part(with_effect: bool) -> VirtualAdis16405 {
     part_in_cycle(20.0, with_effect, SEED)
 }
@@ -82,7 +83,7 @@ fn an_injected_temperature_effect_is_subtracted_in_the_next_epoch() {
         let [cause] = learnt.regressors[..] else { panic!("{learnt:?}") };
         assert_eq!(cause.covariate, Channel::Temp as u8);
         assert!((cause.low..=cause.high).contains(&SENSITIVITY), "{cause:?}");
-        // The part is at 36 °C and warms.
+        // The part is at 36 °C and warms up.
         assert!((36.0..=36.0 + 8.0 + 3.0).contains(&cause.reference), "{cause:?}");
     }
     let of_gyro_x = |heard: &Transcript| heard.checked.iter().filter(|c| c.channel == 1).cloned().collect::<Vec<_>>();
@@ -92,16 +93,16 @@ fn an_injected_temperature_effect_is_subtracted_in_the_next_epoch() {
         let relative_error = (learnt.regressors[0].high - learnt.regressors[0].low) / 2.0 / SENSITIVITY;
         for (drift, without) in checked.drift.iter().zip(&twin.drift) {
             println!("epoch {}, n = {}: {:.2e} -> {:.2e}", checked.epoch, drift.n, drift.raw, drift.compensated);
-            // At most the drift without the effect, and the part of the effect that the confidence interval leaves open; a
-            // tenth more for the rounding of the temperature, 0.04 °C.
+            // The compensated drift is at most the drift without the effect and the part of the effect within the
+            // confidence interval, with a tenth more for the rounding of the temperature to 0.04 °C.
             assert!(drift.compensated <= 1.1 * without.raw + relative_error * drift.raw, "{drift:?}, {without:?}");
         }
-        // A cycle of amplitude A has σ = A·sin²(πτ/T)/(πτ/T), 0.64·A at half the cycle: 0.095 deg/s of 0.05 times 3 degC. The
-        // gyro's own noise has there, at 10 s, √(0.0368²/10 + (0.664·0.0093)² + 0.0013²·10/3) = 0.0134.
+        // A cycle of amplitude A has σ = A·sin²(πτ/T)/(πτ/T), 0.64·A at half the cycle: 0.095 deg/s for 0.05 times 3 degC. The gyro's own
+        // noise at 10 s is √(0.0368²/10 + (0.664·0.0093)² + 0.0013²·10/3) = 0.0134.
         let half = checked.drift.iter().find(|drift| drift.n == 2048).expect("10 s of 100 s");
         assert!((half.raw / 0.095 - 1.0).abs() < 0.2, "{half:?}");
         assert!(half.raw > 4.0 * half.compensated, "{half:?}");
-        // The gyro's own mean moves by 0.013 deg/s from one epoch to the next: K²·100 s·2/3 and the flicker noise.
+        // The gyro's own mean changes by 0.013 deg/s from one epoch to the next: K²·100 s·2/3 and the flicker noise.
         let shift = checked.shift.expect("means of both epochs");
         assert!(shift.compensated.abs() <= relative_error * shift.raw.abs() + 3.0 * 0.013, "{shift:?}");
     }
@@ -112,7 +113,7 @@ fn an_injected_temperature_effect_is_subtracted_in_the_next_epoch() {
     let told = |line: &String| line.starts_with(" gyro x  temp ") && line.ends_with(" deg/s/degC");
     assert!(lines.iter().any(told), "{lines:#?}");
     assert!(lines.iter().all(|line| line.is_ascii() && line.len() <= 80), "{lines:#?}");
-    // The errors before and after, beside the coefficients.
+    // The table shows the errors before and after, beside the coefficients.
     assert!(lines.iter().any(|line| line.starts_with(" x     ") && line.contains(" -> ")), "{lines:#?}");
 }
 
@@ -126,11 +127,11 @@ fn without_an_effect_nothing_is_subtracted() {
     }
 }
 
-/// Epochs of a minute, as on the image. The octaves at τ = 1.25, 2.5, 5 and 10 s have the cycle's Allan variance,
-/// 9 °C²·sin⁴(πτ/T)/(πτ/T)², and 70, 35, 17 and 8 degrees of freedom of the gyro's noise. With T = 20 s the weighted regression has
-/// 18 of them and a standard error of 0.0022 °/s/°C: t = 23 is as improbable as 7.6 standard deviations of a normal distribution,
-/// and 4.5 are asked for. With T = 50 s the cycle's power is at 10 and 20 s, where there are 7 in all: t = 18 is as improbable
-/// as 4.7, so that more than half of the epochs learn the effect and not all.
+/// Epochs of a minute, as in the image. The octaves at τ = 1.25, 2.5, 5 and 10 s have the cycle's Allan variance, 9 °C²·sin⁴(πτ/T)/(πτ/T)²,
+/// and 70, 35, 17 and 8 degrees of freedom of the gyro's noise. With T = 20 s the weighted regression has 18 degrees of freedom and a
+/// standard error of 0.0022 °/s/°C: t = 23 is as improbable as 7.6 normal standard deviations, and 4.5 are required. With T = 50 s the
+/// cycle's power is at 10 and 20 s with 7 degrees of freedom: t = 18 is as improbable as 4.7, so more than half of the epochs learn the
+/// effect, but not all.
 #[test]
 fn an_effect_that_an_epoch_can_show_is_learned_in_every_epoch() {
     let learned = |period_s: f64| -> Vec<ReportedRegressor> {
@@ -149,13 +150,13 @@ fn an_effect_that_an_epoch_can_show_is_learned_in_every_epoch() {
         let half_width = (cause.high - cause.low) / 2.0;
         assert!((0.5..2.0).contains(&(half_width / (1.96 * 0.0024))), "{cause:?}");
     }
-    // More than 7 of 40 intervals of 95 % miss the truth in one case of a thousand.
+    // More than 7 of 40 intervals of 95 % miss the truth once in a thousand cases.
     let missed = causes.iter().filter(|cause| !(cause.low..=cause.high).contains(&SENSITIVITY)).count();
     assert!(missed <= 7, "{missed} of 40 intervals miss the truth");
 }
 
-/// A process with a time constant of 0.2 s and a deviation of 0.4 °/s, whose Allan deviation of up to 0.25 °/s at 0.38 s is four
-/// times the white noise there, is named in every epoch of a minute, and its model foretells the next one.
+/// A process with a time constant of 0.2 s and a deviation of 0.4 °/s has an Allan deviation of up to 0.25 °/s at 0.38 s, four times that
+/// of the white noise there. It is named in every epoch of a minute, and its model predicts the next epoch.
 #[test]
 fn a_gauss_markov_process_is_named_in_every_epoch() {
     let (mut named, mut foretold) = (0, 0);
@@ -179,9 +180,9 @@ fn a_gauss_markov_process_is_named_in_every_epoch() {
 /// SENS_AVG, lower byte, of the sensor's register map (data sheet Rev. B, Table 8): sixteen taps a stage.
 const SIXTEEN_TAPS: [u8; 2] = [0xB8, 0x04];
 
-/// The sensor's filter at another setting than the firmware has programmed, and does not look at again, is named on the gyros. An
-/// accelerometer's count of 3.33 mg is three times the deviation of its noise behind the filter, 0.34 mg·√s·√(204.8 Hz·0.0417) = 1.0 mg,
-/// and rounding makes its curve another than the filter's: what is named there halves the error of the next epoch at least.
+/// The sensor's filter is not at the setting that the firmware has programmed and does not read again; it is named on the gyros. An
+/// accelerometer's count of 3.33 mg is three times the deviation of its noise behind the filter, 0.34 mg·√s·√(204.8 Hz·0.0417) = 1.0 mg.
+/// Rounding changes its curve, so a term that is named there must at least halve the error of the next epoch.
 #[test]
 fn another_filter_in_the_sensor_is_named() {
     let part = VirtualAdis16405::new(NoiseModel::paper(), SEED);
@@ -217,7 +218,7 @@ fn every_used_sample_is_in_exactly_one_epoch() {
     assert_eq!(samples, u64::from(last.health.expect("a report").used));
 }
 
-/// A restart loses the covariances of the channels, so the epoch that contains it learns no sensitivity.
+/// A restart loses the covariances of the channels, so an epoch with a restart learns no sensitivity.
 #[test]
 fn an_epoch_with_a_restart_in_it_subtracts_nothing() {
     let memory = Device::blank_memory();

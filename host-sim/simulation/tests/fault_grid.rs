@@ -1,6 +1,6 @@
-//! Faults of the lines between sensor and microcontroller, a table of kinds, rates and seeds, from the virtual sensor to the report
-//! that the host decodes: how many words arrive wrong, how many of them are used all the same, how many right ones are refused, how
-//! long no sample is used, and by how much N, B and K shift; and damage on the serial port.
+//! Faults of the lines between sensor and microcontroller: a table of kinds, rates and seeds, from the virtual sensor to the decoded
+//! report. Counted are wrong words, used wrong words, refused right words, the longest time without a used sample, and the shifts of N, B
+//! and K. Damage on the serial port is tested too.
 
 use link::{ChannelMessage, Decoder, Message, Received};
 use rand::{Rng, SeedableRng};
@@ -11,16 +11,16 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use virtual_sensor::{DiagnosisFlag, NoiseModel, VirtualAdis16405};
 
 const RATE_HZ: f64 = 204.8;
-/// Bits of a temperature; the other words have 14.
+/// Channel and bits of the temperature; the other words have 14 bits.
 const TEMPERATURE: (u8, i32) = (10, 12);
-/// Bursts after a start that hold something of what was before: two of the filter, which has one tap, and those of 6.2 ms, in which the
-/// poles of 330 Hz settle.
+/// Bursts after a start that depend on earlier ones: two for the filter of one tap, and those within 6.2 ms, in which the poles of 330 Hz
+/// settle.
 const SETTLING: u64 = 2 + 2;
-/// Length of the short runs, s: within it no fault of bursts moves N, B and K out of their bounds.
+/// Length of the short runs, s. No fault of bursts moves N, B and K out of their bounds in this time.
 const SHORT_S: f64 = 960.0;
 
 fn device(seed: u64) -> Device {
-    // Flicker noise of longer times is hidden by the random walk.
+    // The random walk hides flicker noise of longer times.
     let model = NoiseModel { longest_tau_s: 300.0, ..NoiseModel::paper() };
     Device::new(VirtualAdis16405::new(model, seed), Device::blank_memory()).with_restarts()
 }
@@ -34,18 +34,19 @@ struct Run {
     audit: SampleAudit,
     longest_gap_s: f64,
     recoveries: u32,
-    /// Bursts in which the error flag is set.
+    /// Number of bursts with the error flag.
     marked: u32,
     restarts: u32,
     channels: Vec<ChannelMessage>,
 }
 
-/// A device with the fault for `seconds`, then without it for three, and its report. In the third all samples are used.
+/// Runs a device with the fault for `seconds`, then without it for three seconds; in the third one all samples are
+/// used.
 fn run(fault: Option<RandomFault>, seconds: f64, seed: u64) -> Run {
     run_with(device(seed), seconds, |device, is_on| device.faults().random = if is_on { fault.clone() } else { None })
 }
 
-/// The same of anything that is switched on and off.
+/// Runs a device with a condition that `switch` turns on and off.
 fn run_with(mut device: Device, seconds: f64, switch: impl Fn(&mut Device, bool)) -> Run {
     device.press(b"i0\r");
     run_until(&mut device, 10.0); // the sensor settles, and the gate learns the noise
@@ -75,8 +76,8 @@ fn run_with(mut device: Device, seconds: f64, switch: impl Fn(&mut Device, bool)
     Run { audit, longest_gap_s, recoveries, marked, restarts: device.restarts(), channels }
 }
 
-/// The largest shifts of N, B and K of gyros and accelerometers against the same sensor without the fault, in half-widths of their
-/// 95 % bounds.
+/// The largest shifts of N, B and K of gyros and accelerometers relative to the same sensor without the fault, in half-widths of their 95 %
+/// bounds.
 fn shifts(run: &Run, sound: &Run) -> [f64; 3] {
     std::array::from_fn(|term| {
         let shift = |(found, sound): (&ChannelMessage, &ChannelMessage)| {
@@ -91,9 +92,9 @@ fn shifts(run: &Run, sound: &Run) -> [f64; 3] {
     })
 }
 
-/// The share of inverted data bits that a plausible size and the samples around cannot tell from noise: a bit changes a sample by a
-/// power of two, and what differs from the sample before by less than seven times the rms difference of two samples, and three counts,
-/// is used. The mean squared difference of two samples is that of the second differences of their sum at one sample.
+/// The fraction of inverted data bits that plausibility and neighbouring samples cannot distinguish from noise. A bit changes a sample by a
+/// power of two. A sample is used if it differs from the one before by less than seven times the rms difference of two samples and three
+/// counts. The mean squared difference of two samples is that of the second differences of their sum at one sample.
 fn undetectable_share(sound: &Run) -> f64 {
     let (mut undetectable, mut bits) = (0.0, 0);
     for channel in &sound.channels {
@@ -110,7 +111,7 @@ fn undetectable_share(sound: &Run) -> f64 {
     undetectable / f64::from(bits)
 }
 
-/// Runs and prints the cells with the seeds `1..=seeds`, each for so many seconds, and checks what holds for all of their kind.
+/// Runs and prints the cells with the seeds `1..=seeds`, each for `seconds`, and checks the properties of their kind.
 fn grid(cells: &[(LineFault, f64)], seeds: u64, seconds: f64) {
     for seed in 1..=seeds {
         let (sound, runs) = std::thread::scope(|scope| {
@@ -122,7 +123,7 @@ fn grid(cells: &[(LineFault, f64)], seeds: u64, seconds: f64) {
             let runs = threads.into_iter().map(|thread| thread.join().expect("no panic"));
             (sound.join().expect("no panic"), runs.collect::<Vec<_>>())
         });
-        // Without a fault nothing is refused: the gate's false alarms are 1e-11 of the samples.
+        // Without a fault no sample is refused: the gate's false alarms are 1e-11 of the samples.
         assert_eq!((sound.audit.wrong, sound.audit.needless, sound.recoveries), (0, 0, 0), "{:?}", sound.audit);
         let undetectable = undetectable_share(&sound);
         println!("seed {seed}: {undetectable:.3} of the inverted bits are within the noise");
@@ -147,30 +148,30 @@ fn grid(cells: &[(LineFault, f64)], seeds: u64, seconds: f64) {
     }
 }
 
-/// No cell restarts the microcontroller or goes without samples for longer than two steps of recovery take, and none moves N, B and K
-/// out of their bounds, but for the noise of a sensor that starts again, and bits inverted so often that a burst in forty has one. Bursts that arrive
-/// again, which nothing tells from others, change the noise itself: in units of bounds, which shrink with the root of the time, by more and more.
+/// No cell restarts the microcontroller or goes without samples for longer than two steps of recovery. None moves N, B and K out of their
+/// bounds, except by the noise of a restarted sensor, or if bits are inverted so often that one burst in forty has an error. Repeated
+/// bursts cannot be detected and change the noise itself; in units of the bounds, which shrink with the root of the time, this grows.
 fn check(fault: LineFault, rate: f64, seconds: f64, run: &Run, shifts: [f64; 3], undetectable: f64) {
     assert_eq!(run.restarts, 0, "{fault:?} at {rate:e}");
     assert!(run.longest_gap_s < 2.5, "{fault:?} at {rate:e}: {} s", run.longest_gap_s);
-    // The noise after a reset is not that of the sensor that was not reset.
+    // A sensor that was reset has other noise than one that was not.
     if fault != Reset && (!fault.is_of_bits() || rate <= 1e-5) {
         let most = if fault == Repeated { (seconds / SHORT_S).sqrt() } else { 1.0 };
         assert!(shifts.iter().all(|shift| shift.abs() < most), "{fault:?} at {rate:e}: {shifts:?}");
     }
-    // A frame that is lost, and a line that reads ones from a bit on, are seen each time.
+    // A lost frame, and a line that reads ones from some bit on, are detected each time.
     if matches!(fault, LostEdge | DoubledEdge | Failed | ShortSelect) {
         assert_eq!(run.audit.undetected, 0, "{fault:?} at {rate:e}");
     }
     if fault == AnswerBits && rate <= 1e-5 {
         let (used, wrong) = (run.audit.undetected as f64, run.audit.wrong as f64);
-        // Four standard deviations.
+        // The tolerance is four standard deviations.
         let tolerance = 4.0 * (wrong * undetectable * (1.0 - undetectable)).sqrt();
         assert!((used - wrong * undetectable).abs() <= tolerance, "{used} of {wrong} used, {undetectable} expected");
     }
 }
 
-/// Every fault at each of the rates for its kind. A start takes a third of a second, so a supply dips in one burst of 10,000 at most.
+/// Every fault at each of the rates for its kind. A start takes a third of a second, so the supply dips in at most one burst of 10,000.
 fn cells(bit_rates: &[f64], burst_rates: &[f64]) -> Vec<(LineFault, f64)> {
     let of = |fault: LineFault| {
         let rates = if fault.is_of_bits() { bit_rates } else { burst_rates };
@@ -190,11 +191,11 @@ fn an_hour_with_each_fault() {
     grid(&cells(&[1e-7, 1e-6, 1e-5, 1e-4], &[1e-5, 1e-4, 1e-3, 1e-2]), 3, 3_600.0);
 }
 
-/// States that last and falsify no word: flags of DIAG_STAT that are set again with every sample, of a weak supply, an
-/// overload, a flash memory and a self-test that failed; a sensor without power or in reset for a second; a USB port whose host does
-/// not read. All but those two last for 110 s.
+/// Lasting states that falsify no word: flags of DIAG_STAT that every sample sets again (weak supply, overload, flash memory, failed
+/// self-test), a sensor without power or in reset for a second, and a USB port whose host does not read. All but the second and third last
+/// for 110 s.
 #[test]
-fn states_that_last_cost_no_sample_that_there_is() {
+fn a_lasting_state_costs_no_sample_that_the_sensor_delivers() {
     fn hold(device: &mut Device, flag: DiagnosisFlag, is_on: bool) {
         device.bus().part_mut().hold_flag(flag, is_on);
     }
@@ -208,7 +209,7 @@ fn states_that_last_cost_no_sample_that_there_is() {
         ("self-test flag", 120.0, |device, is_on| hold(device, DiagnosisFlag::SelfTest, is_on)),
         ("sensor without power", 11.1, |device, is_on| {
             if is_on {
-                run_until(device, 10.1); // the gap has a beginning
+                run_until(device, 10.1); // the gap begins after some samples
                 device.bus().part_mut().power_off();
             } else {
                 device.bus().part_mut().power_on();
@@ -237,7 +238,7 @@ fn states_that_last_cost_no_sample_that_there_is() {
     );
     for ((name, end_s, _), run) in STATES.iter().zip(&runs) {
         let (audit, stops) = (&run.audit, *end_s < 12.0);
-        // A sensor that starts again has another noise, and a run of 15 s another curve.
+        // A restarted sensor has other noise, and a run of 15 s another curve.
         let shift = if stops { [0.0; 3] } else { shifts(run, &runs[0]) };
         println!(
             "{name:<22} {:8}  {:6}  {:5}  {:4}  {:13}  {:9.3} s  {:6}  {:10.2}  {:6.2}  {:6.2}",
@@ -255,7 +256,7 @@ fn states_that_last_cost_no_sample_that_there_is() {
         // Each sample has the flag, also those between two reads of DIAG_STAT.
         assert_eq!(run.marked > 20_000, name.ends_with("flag"), "{name}: {} marked", run.marked);
         assert_eq!((run.restarts, audit.undetected), (0, 0), "{name}: {audit:?}");
-        // The first bursts after a start are refused: the channels settle.
+        // The first bursts after a start are refused while the channels settle.
         assert!(audit.needless <= if stops { 8 * SETTLING } else { 0 }, "{name}: {audit:?}");
         assert!(shift.iter().all(|shift| shift.abs() < 0.01), "{name}: {shift:?}");
         // Start-up and configuration take 0.3 s, and the first steps of recovery 2 s.
@@ -264,8 +265,8 @@ fn states_that_last_cost_no_sample_that_there_is() {
     }
 }
 
-/// Bytes of the serial port that are lost, or inverted in a bit. A byte between two frames belongs to both: each costs two messages at
-/// most. No message arrives with another content: the checksum has 32 bits.
+/// Bytes of the serial port are lost, or have an inverted bit. A byte between two frames belongs to both, so an error costs at most two
+/// messages. No message arrives with other content: the checksum has 32 bits.
 #[test]
 fn damage_on_the_serial_port_costs_messages_and_falsifies_none() {
     let mut device = device(1);

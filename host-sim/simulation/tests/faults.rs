@@ -1,5 +1,5 @@
-//! The firmware's application on the host with faults of the sensor, the bus, the board and its own tasks: each is found,
-//! told by its cause, counted, and recovered from, and costs no more samples than stated.
+//! The firmware's application on the host with faults of the sensor, the bus, the board and its own tasks. Each is
+//! detected, reported by its cause, counted, recovered from, and costs no more samples than stated.
 
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use embedded_hal::spi::SpiDevice;
@@ -55,7 +55,7 @@ fn report_after(device: &mut Device, keys: &str, seconds: f64) -> Heard {
     heard
 }
 
-/// A part that answers wrongly at the usual times of the bus: the fifth step keeps longer ones, and the log says so.
+/// A part answers wrongly at the usual times of the bus. The fifth step switches to longer times, and the log says so.
 #[test]
 fn a_part_that_needs_longer_times_gets_them() {
     let mut device = device();
@@ -79,7 +79,8 @@ fn health_after(device: &mut Device, seconds: f64) -> Health {
     report_after(device, "", seconds).health.expect("a report")
 }
 
-/// DIAG_STAT stays set until it is read. Each of its bits is read once, counted by its cause, logged, and costs no sample.
+/// DIAG_STAT keeps its flags until it is read. Each flag is read once, counted by its cause, logged, and costs no
+/// sample.
 #[test]
 fn a_latched_error_flag_is_read_and_told_by_its_cause() {
     type Counter = fn(&Health) -> u32;
@@ -125,8 +126,8 @@ fn a_flag_of_the_sensor_itself_is_read() {
     }
 }
 
-/// A supply of 4.70 V, as from a USB port: every sample is used and marked, and the coefficients are reported. The register
-/// is read once a second.
+/// The supply is 4.70 V, as from a USB port. Every sample is used and marked, and the coefficients are reported. The
+/// register is read once a second.
 #[test]
 fn a_board_on_a_weak_usb_port_reports_coefficients() {
     for (keys, rate_hz) in [("", RATE_HZ), ("f 819.2\r", 819.2)] {
@@ -143,11 +144,11 @@ fn a_board_on_a_weak_usb_port_reports_coefficients() {
     }
 }
 
-/// A fault of every burst is recovered from by the first step that removes it, and each step taken is counted.
+/// The first step that removes a fault of every burst ends it, and each step is counted.
 #[test]
 fn the_first_step_that_helps_ends_a_fault() {
     let cases = [
-        // Fault, its end, re-reads, bus resets, sensor resets.
+        // The columns are fault, end, re-reads, bus resets, sensor resets.
         (FrameFault::Shifted, FaultEnd::Bursts(16), [1, 0, 0]),
         (FrameFault::Shifted, FaultEnd::Pulse, [1, 1, 0]),
         (FrameFault::Stale, FaultEnd::Reset, [1, 1, 1]),
@@ -170,7 +171,7 @@ fn the_first_step_that_helps_ends_a_fault() {
     }
 }
 
-/// The RST line, where it is connected, comes after the software reset.
+/// If the RST line is connected, its step follows the software reset.
 #[test]
 fn a_sensor_that_takes_no_command_is_reset_by_its_line() {
     let mut device = device().with_reset_line();
@@ -184,7 +185,7 @@ fn a_sensor_that_takes_no_command_is_reset_by_its_line() {
     assert_eq!(device.restarts(), 0);
 }
 
-/// A single refused burst, and a rate that one gyro cannot measure, call for no step at all.
+/// A single refused burst, or a rate that one gyro cannot measure, causes no recovery step.
 #[test]
 fn a_refused_burst_costs_that_burst() {
     for (fault, refused, partly) in [(FrameFault::Shifted, 1, 0), (FrameFault::ImpossibleRate, 0, 1)] {
@@ -197,7 +198,7 @@ fn a_refused_burst_costs_that_burst() {
     }
 }
 
-/// While DIO1 is off every probe succeeds. That is one loss, not one a second, and the steps rise.
+/// While DIO1 is off every probe succeeds. This counts as one loss, not one per second, and the steps rise.
 #[test]
 fn an_interrupted_data_ready_line_is_one_loss() {
     let mut device = device();
@@ -214,8 +215,8 @@ fn an_interrupted_data_ready_line_is_one_loss() {
     assert!(f64::from(used) > 8.4 * RATE_HZ, "{used} samples in 10 s");
 }
 
-/// A line that oscillates would leave the processor no time. It is masked after 16 edges, at each step of recovery again, and told;
-/// when it has calmed down, sampling goes on.
+/// An oscillating line would leave the processor no time. It is masked after 16 edges, again at each step of recovery, and reported.
+/// Sampling goes on when the oscillation has ended.
 #[test]
 fn an_oscillating_data_ready_line_is_masked_and_told() {
     let mut device = device();
@@ -225,7 +226,7 @@ fn an_oscillating_data_ready_line_is_masked_and_told() {
     let heard = report_after(&mut device, "", 10.0);
     let health = heard.health.expect("a report");
     let edges = device.edges() - edges_before;
-    // Ten steps of recovery, once a second, each of which takes the edges again.
+    // There are ten steps of recovery, one a second, and each accepts edges again.
     assert!((8..=12).contains(&health.data_ready_masked), "{health:?}");
     assert!(edges <= 16 * u64::from(health.data_ready_masked) + 16, "{edges} interrupts");
     assert!(
@@ -255,7 +256,7 @@ fn after_thirty_failed_steps_the_microcontroller_is_restarted_once() {
     assert!(f64::from(after) > 8.4 * RATE_HZ, "{after} samples in 10 s, {used} before");
 }
 
-/// A sensor that was never there restarts nothing.
+/// A sensor that was never present causes no restart.
 #[test]
 fn an_absent_sensor_does_not_restart_the_microcontroller() {
     let mut absent = part();
@@ -270,7 +271,7 @@ fn an_absent_sensor_does_not_restart_the_microcontroller() {
     assert!(f64::from(health_after(&mut device, 10.0).used) > 8.2 * RATE_HZ);
 }
 
-/// A task that stops is found although the main loop lives: the watchdog is not fed, and restarts the microcontroller.
+/// A stopped task is detected although the main loop runs: the watchdog is not fed and restarts the microcontroller.
 #[test]
 fn a_stopped_task_is_ended_by_the_watchdog() {
     for estimators in [true, false] {
@@ -279,7 +280,7 @@ fn a_stopped_task_is_ended_by_the_watchdog() {
         device.faults().no_estimators = estimators;
         device.faults().no_transmission = !estimators;
         let now_us = device.bus().part().now() / 1000;
-        // Found within 2 s or 10 s, then 8 s without being fed.
+        // A stop is detected within 2 s or 10 s, and then the watchdog takes 8 s.
         let limit_s = if estimators { 11 } else { 20 };
         device.run_until(now_us + limit_s * SECOND);
         assert_eq!(device.restarts(), 1, "estimators: {estimators}");
@@ -290,7 +291,7 @@ fn a_stopped_task_is_ended_by_the_watchdog() {
     }
 }
 
-/// After power-on the sensor takes 220 to 290 ms, in which it is not clocked.
+/// After power-on the sensor takes 220 to 290 ms, and is not clocked in this time.
 #[test]
 fn a_cold_sensor_is_not_clocked() {
     let mut cold = part();
@@ -301,13 +302,13 @@ fn a_cold_sensor_is_not_clocked() {
         device.press(b"i0\r");
         let health = health_after(&mut device, 3.0);
         assert_eq!(device.bus().part().violations(), [], "{cause:?}");
-        // 290 ms, and a self-test of 48 ms at this rate.
+        // The start takes 290 ms, and the self-test 48 ms at this rate.
         let sampled_s = f64::from(health.used + health.settling) / RATE_HZ;
         assert!((2.57..2.7).contains(&sampled_s), "{cause:?}: {health:?}");
     }
 }
 
-/// A dip of its supply restarts the sensor: it is left alone while it starts up, then configured again.
+/// A dip of the supply restarts the sensor. It is not clocked while it starts up, then it is configured again.
 #[test]
 fn a_sensor_that_lost_its_supply_is_not_clocked_while_it_starts() {
     let mut device = device();
@@ -321,7 +322,7 @@ fn a_sensor_that_lost_its_supply_is_not_clocked_while_it_starts() {
     assert!(f64::from(health.used - before.used) > 4.5 * RATE_HZ, "{health:?}");
 }
 
-/// Below 182 SPS the sensor takes 300 kHz and a stall of 75 us. The clock is set with the rate, and back.
+/// Below 182 SPS the sensor needs 300 kHz and a stall of 75 µs. The clock changes with the rate, in both directions.
 #[test]
 fn slow_rates_are_sampled_with_a_slow_clock() {
     let mut device = device();
@@ -340,7 +341,7 @@ fn slow_rates_are_sampled_with_a_slow_clock() {
     assert_eq!(device.bus().part().violations(), []);
 }
 
-/// The injector: what it does to a burst, and that it does nothing without a fault.
+/// The injector damages a burst as stated, and does nothing without a fault.
 #[test]
 fn the_injector_damages_what_it_says() {
     let mut device = device();

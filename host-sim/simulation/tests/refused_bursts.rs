@@ -1,14 +1,14 @@
-//! The device at 819.2 samples a second with a refused burst every second, beside the same sensor without faults: the curves
-//! reach the same averaging time, and the coefficients agree.
+//! The device at 819.2 samples a second with one refused burst per second, compared with the same sensor without
+//! faults. The curves reach the same averaging time, and the coefficients agree.
 
 use link::{ChannelMessage, Decoder, Message, Received, ReportedTerm};
 use simulation::{Device, FaultEnd, FrameFault};
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// The channels of the device after `seconds` at 819.2 samples a second; with `refusals`, the second half of the frames of one
-/// burst every second comes a clock early.
+/// The channels of the device after `seconds` at 819.2 samples a second. With `refusals`, one burst every second has the second half of its
+/// frames a clock early.
 fn channels(seconds: u32, refusals: bool) -> Vec<ChannelMessage> {
-    // Flicker noise of longer times is hidden by the random walk.
+    // The random walk hides flicker noise of longer times.
     let model = NoiseModel { longest_tau_s: 300.0, ..NoiseModel::paper() };
     let mut device = Device::new(VirtualAdis16405::new(model, 14), Device::blank_memory());
     device.press(b"i0\rf819.2\r");

@@ -1,4 +1,4 @@
-//! A file that is replayed over the bus gives the recording that is read of it, or is refused with its line.
+//! A replayed file gives the same recording as a read one, or is refused with its line.
 
 use adis16405_driver::GyroRange;
 use recordings::InputError;
@@ -7,7 +7,7 @@ use recordings::time_base::time_base;
 use simulation::{Replay, replay};
 use std::fmt::Write;
 
-/// Replays a file of this content.
+/// Replays a file with this content.
 fn replayed(text: &str) -> Result<Replay, InputError> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("file.csv");
@@ -67,7 +67,7 @@ fn a_table_is_replayed_to_the_recording_that_is_read() {
     }
 }
 
-/// Bursts of counts with the squares of their numbers, and a write before those of the given numbers.
+/// A log of bursts with the squares of their numbers, and a write before each burst of the given numbers.
 fn log(writes: &[(u32, &str)]) -> String {
     let mut text = String::from("time_s,mosi,miso\n");
     for i in 0..=60_u32 {
@@ -104,7 +104,7 @@ fn a_log_is_read_behind_a_byte_order_mark_or_blank_lines() {
 }
 
 #[test]
-fn what_is_no_burst_of_the_driver_is_refused() {
+fn a_transaction_that_is_no_burst_of_the_driver_is_refused() {
     let zeros = |digits: usize| "0".repeat(digits);
     for (text, words) in [
         ("a,b\n1,2\n".to_owned(), &["line 1", "no known column", "gyro_x_counts"][..]),

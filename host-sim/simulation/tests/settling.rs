@@ -1,5 +1,5 @@
-//! A self-test displaces the outputs (data sheet Rev. B, page 15), and the sensor's filter holds the displacement for 2N samples
-//! (Fig. 15): the curve with these samples, without them as the device reports it, and of a part that is not tested.
+//! A self-test displaces the outputs (data sheet Rev. B, page 15), and the sensor's filter contains the displacement for 2N samples (Fig.
+//! 15). Compared are the curve with these samples, the curve without them as the device reports it, and that of an untested part.
 
 use adis16405_driver::{Channel, Config, GyroRange, OutputWord, SamplePeriod};
 use allan_core::Curve;
@@ -13,7 +13,8 @@ const SECONDS: u64 = 200;
 const CHECK_EVERY_S: u64 = 10;
 const SECOND: u64 = 1_000_000;
 
-/// Output of a device with a filter of 2^`taps_log2` taps a stage in [`SECONDS`]: raw bursts and the last report of gyro x.
+/// Output of a device with a filter of 2^`taps_log2` taps a stage after [`SECONDS`]: raw bursts, and the last report of
+/// gyro x.
 fn run(taps_log2: u8, tested: bool) -> (Vec<RawMessage>, ChannelMessage) {
     let part = VirtualAdis16405::new(NoiseModel::paper(), 3);
     let mut device = Device::new(part, Device::blank_memory());
@@ -43,7 +44,7 @@ fn run(taps_log2: u8, tested: bool) -> (Vec<RawMessage>, ChannelMessage) {
     (raws, report.clone())
 }
 
-/// The curve of gyro x over every burst of a raw stream: those in which the filter still mixes the displacement, too.
+/// The curve of gyro x over every burst of a raw stream, including those in which the filter contains the displacement.
 fn with_all_samples(raws: &[RawMessage], scale: ReportScale) -> Curve<OCTAVES> {
     let mut estimator = Box::new(ChannelEstimator::new());
     let mut next = None;
@@ -61,15 +62,15 @@ fn with_all_samples(raws: &[RawMessage], scale: ReportScale) -> Curve<OCTAVES> {
     ChannelSums::from_estimator(&estimator).curve(Channel::GyroX, scale)
 }
 
-/// Allan deviations of a report at averaging factor `n`, and how many differences it has.
+/// The Allan deviation of a report at averaging factor `n`, and the number of its differences.
 fn reported(report: &ChannelMessage, n: u64, scale: ReportScale) -> (f64, f64) {
     let octave = report.octaves.iter().find(|octave| octave.n == n).expect("an octave");
     let mean = octave.sum as f64 / (2.0 * (n * n) as f64 * octave.count as f64);
     ((mean - f64::from(octave.interpolation)).sqrt() * scale.lsb(Channel::GyroX), octave.count as f64)
 }
 
-/// With the gap the curve is that of a part which was not tested, within four standard errors of the ratio of two independent
-/// estimates; with the mixed samples it is several times as high where averages are as long as the filter.
+/// With the gap the curve is that of an untested part, within four standard errors of the ratio of two independent estimates. With the
+/// displaced samples it is several times as high at averaging times of the filter's length.
 #[test]
 fn the_filter_mixes_a_self_test_into_the_curve_unless_its_samples_are_a_gap() {
     for taps_log2 in [4, 6] {
@@ -85,14 +86,14 @@ fn the_filter_mixes_a_self_test_into_the_curve_unless_its_samples_are_a_gap() {
             let all = before.points().iter().find(|point| point.n == n).expect("an octave").avar.sqrt();
             let ((gap, differences), (truth, _)) = (reported(&report, n, scale), reported(&untested, n, scale));
             println!("| {:.4} | {all:.4} | {gap:.4} | {truth:.4} |", n as f64 / RATE_HZ);
-            // Differences of neighbours overlap for 2n samples, and behind the filter samples are correlated over 2N.
+            // Differences overlap for 2n samples, and samples behind the filter are correlated over 2N.
             let independent = differences / (2 * n.max(2 << taps_log2)) as f64;
             let bound = 4.0 * (1.0 / independent).sqrt();
             assert!((gap / truth - 1.0).abs() < bound, "{n}: {gap}, {truth} within {bound}");
             worst = worst.max(all / truth);
         }
         println!("at worst {worst:.1} times as high");
-        // The delay of one sample holds the displacement at N = 1 too.
+        // The delay of one sample contains the displacement at N = 1 too.
         assert!(worst > 3.0, "{worst}");
     }
 }

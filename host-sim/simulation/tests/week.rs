@@ -1,7 +1,7 @@
-//! A simulated week of the device with a fault of every kind a day, and a shorter run with each fault once.
+//! A simulated week of the device with a fault of every kind per day, and a shorter run with each fault once.
 //!
-//! Nobody presses a key after the start. The samples used are compared with those that an observer would use who knows when
-//! the sensor delivers good samples, and the coefficients with those of the same sensor without faults.
+//! No key is pressed after the start. The used samples are compared with those that the sensor delivered in good state,
+//! and the coefficients with those of the same sensor without faults.
 
 use embedded_hal::spi::SpiDevice;
 use link::{ChannelMessage, Decoder, Health, Hello, Message, Received, ReportedCoefficient};
@@ -14,23 +14,23 @@ const SEED: u64 = 20;
 /// A fault of the schedule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
-    /// Frames, for so many seconds or until the fault ends by itself.
+    /// A frame fault, for a time in s or until it ends by itself.
     Frames(FrameFault, FaultEnd, f64),
-    /// A bit of DIAG_STAT.
+    /// A flag of DIAG_STAT, by its bit.
     Flag(u32),
-    /// No data-ready edges for so many seconds.
+    /// There are no data-ready edges for this time, s.
     NoDataReady(f64),
     /// The sensor resets itself.
     SensorReset,
-    /// The sensor has no supply for so many seconds.
+    /// The sensor has no supply for this time, s.
     PowerOff(f64),
-    /// The estimators' interrupt does not come until the watchdog bites.
+    /// The estimators' interrupt does not come until the watchdog restarts the device.
     StoppedEstimators,
-    /// The serial port sends nothing for so many seconds.
+    /// The serial port sends nothing for this time, s.
     StoppedPort(f64),
 }
 
-/// Every fault, once.
+/// All faults, each once.
 const FAULTS: [Fault; 22] = [
     Fault::Frames(FrameFault::Shifted, FaultEnd::Bursts(1), 1.0),
     Fault::Frames(FrameFault::ImpossibleRate, FaultEnd::Bursts(1), 1.0),
@@ -71,7 +71,7 @@ struct Report {
 
 impl Run {
     fn new() -> Self {
-        // Flicker noise of longer times is hidden by the random walk.
+        // The random walk hides flicker noise of longer times.
         let model = NoiseModel { longest_tau_s: 300.0, ..NoiseModel::paper() };
         let part = VirtualAdis16405::new(model, SEED);
         let mut device = Device::new(part, Device::blank_memory()).with_restarts();
@@ -140,13 +140,13 @@ impl Run {
         Report { hello, health, channels }
     }
 
-    /// Samples that an observer would have used who knows when they are good.
+    /// Number of samples that the sensor delivered in good state.
     fn usable(&self) -> f64 {
         self.device.usable_us() as f64 * 1e-6 * RATE_HZ
     }
 }
 
-/// Prints and returns the share of the good samples that are in the statistics. Every damaged burst is taken as used.
+/// Prints and returns the fraction of the good samples that are in the statistics. Every damaged burst counts as used.
 fn share_used(run: &Run, report: &Report) -> f64 {
     let damaged = run.device.faults().damaged;
     let used = report.channels.iter().map(|channel| channel.samples).min().expect("channels");
@@ -156,7 +156,7 @@ fn share_used(run: &Run, report: &Report) -> f64 {
     share
 }
 
-/// No counter is near its end, and the counters of bursts and samples are consistent.
+/// No counter is near its maximum, and the counters of bursts and samples are consistent.
 fn assert_counters(report: &Report) {
     let health = &report.health;
     let largest = [health.bursts, health.used, health.error_alarm, health.lost_edges, health.repeated];
@@ -168,7 +168,7 @@ fn assert_counters(report: &Report) {
     }
 }
 
-/// Every coefficient agrees with that of the sensor without faults: the 95 % bounds of both overlap.
+/// Every coefficient agrees with that of the sensor without faults: their 95 % bounds overlap.
 fn assert_coefficients(report: &Report, undisturbed: &Report) {
     for (found, expected) in report.channels.iter().zip(&undisturbed.channels) {
         for (found, expected) in found.coefficients.iter().zip(&expected.coefficients) {
@@ -179,8 +179,7 @@ fn assert_coefficients(report: &Report, undisturbed: &Report) {
     }
 }
 
-/// Twenty minutes with every fault once. A loss costs 1.5 s at most: 0.3 s of start-up, a probe, and up to a second before the
-/// next step; no step of recovery costs what a good sensor would have delivered for longer.
+/// Twenty minutes with each fault once. A loss costs at most 1.5 s: 0.3 s of start-up, a probe, and up to a second before the next step.
 #[test]
 fn twenty_minutes_with_every_fault_once() {
     let (mut run, mut twin) = (Run::new(), Run::new());
@@ -222,7 +221,7 @@ fn a_week_with_every_fault_every_day() {
             run.inflict(fault);
         }
         run.to(start_s + 22.7 * 3_600.0);
-        // A restart by the watchdog, or by the last step of recovery, every other day.
+        // The watchdog, or the last step of recovery, restarts the device every other day.
         run.inflict(if day % 2 == 0 { Fault::StoppedEstimators } else { Fault::NoDataReady(60.0) });
         run.to(start_s + DAY_S);
         let report = run.report();

@@ -1,10 +1,10 @@
-//! The procedures of the part that take time. Durations are those of the data sheet (Rev. B): Table 1, and pages 10 and 13 for
-//! those that write the flash.
+//! The procedures of the part that take time. Durations are those of the data sheet (Rev. B): Table 1, and pages 10 and 13 for procedures
+//! that write the flash.
 
 /// A procedure that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// After power-on.
+    /// The start-up after power-on.
     StartUp,
     /// GLOB_CMD bit 7.
     Reset,
@@ -22,7 +22,7 @@ pub enum Activity {
     PrecisionAutoNull,
     /// SLP_CNT.
     Sleep,
-    /// Recovery from sleep.
+    /// The recovery from sleep.
     WakeUp,
 }
 
@@ -38,7 +38,7 @@ impl Activity {
             Activity::FlashTest if low_power => 90,
             Activity::FlashTest => 17,
             Activity::FlashUpdate | Activity::FactoryRestore | Activity::AutoNull => 50,
-            // 30 s offline, then the flash update.
+            // The procedure takes 30 s offline, then the flash update.
             Activity::PrecisionAutoNull => 30_050,
             Activity::Sleep => 0,
             Activity::WakeUp if low_power => 15,
@@ -47,22 +47,22 @@ impl Activity {
         ms * 1_000_000
     }
 
-    /// True if the controller must not use the bus meanwhile.
+    /// True if the controller must not use the bus during the procedure.
     pub(crate) const fn needs_silent_bus(self) -> bool {
         !matches!(self, Activity::SelfTest | Activity::FlashTest)
     }
 
-    /// True if the part goes on sampling meanwhile, for itself alone if it [is offline](Self::is_offline).
+    /// True if the part samples during the procedure; the samples reach no output if it [is offline](Self::is_offline).
     pub(crate) const fn keeps_sampling(self) -> bool {
         matches!(self, Activity::SelfTest | Activity::FlashTest | Activity::AutoNull | Activity::PrecisionAutoNull)
     }
 
-    /// True if the samples that the part takes meanwhile reach no output.
+    /// True if samples taken during the procedure reach no output.
     pub(crate) const fn is_offline(self) -> bool {
         matches!(self, Activity::PrecisionAutoNull)
     }
 
-    /// The bit of MSC_CTRL that starts the procedure and clears at its end; 0 for those of other registers.
+    /// The bit of MSC_CTRL that starts the procedure and clears at its end; 0 for procedures of other registers.
     pub(crate) const fn test_bit(self) -> u16 {
         match self {
             Activity::SelfTest => 1 << 10,
@@ -78,7 +78,7 @@ pub enum BusyAnswers {
     /// Zeros.
     #[default]
     Zeros,
-    /// Ones: the part ignores the bus and does not drive its data line, which is pulled up.
+    /// Ones: the part ignores the bus and does not drive its data line, which has a pull-up.
     Ones,
     /// Random words, the same in every run.
     Garbage,

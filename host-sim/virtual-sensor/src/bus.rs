@@ -33,12 +33,13 @@ impl EmulatedBus {
         Self { part: Rc::new(RefCell::new(part)) }
     }
 
-    /// The part. The borrow must end before the bus is used again, which would panic.
+    /// The part. The borrow must end before the bus is used again, or that use panics.
     pub fn part(&self) -> Ref<'_, VirtualAdis16405> {
         self.part.borrow()
     }
 
-    /// The part, to inject faults or to drive pins. The borrow must end before the bus is used again, which would panic.
+    /// The part, to inject faults or to drive pins. The borrow must end before the bus is used again, or that use
+    /// panics.
     pub fn part_mut(&self) -> RefMut<'_, VirtualAdis16405> {
         self.part.borrow_mut()
     }
@@ -53,7 +54,7 @@ impl EmulatedBus {
         VirtualResetLine { part: Rc::clone(&self.part) }
     }
 
-    /// Advances time to the next data-ready pulse and returns that time, ns; `None` if no pulse is to come.
+    /// Advances time to the next data-ready pulse and returns that time, ns; `None` if no pulse will come.
     pub fn wait_for_data(&self) -> Option<u64> {
         let mut part = self.part.borrow_mut();
         let at_ns = part.next_data_ready();
@@ -110,7 +111,7 @@ impl SpiDevice<u8> for EmulatedBus {
     }
 }
 
-/// Every future is ready at once: the transaction advances virtual time itself.
+/// Every future is ready at once, since a transaction advances virtual time itself.
 impl embedded_hal_async::spi::SpiDevice<u8> for EmulatedBus {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
         SpiDevice::transaction(self, operations)

@@ -1,4 +1,4 @@
-//! The bits of DIAG_STAT, and the checks of each sample that set them: supply voltage and the two alarms.
+//! The bits of DIAG_STAT, and the checks of each sample that set them: the supply voltage and the two alarms.
 
 use crate::registers::{self, OutputRegister, RegisterFile};
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ pub(crate) const SPI: u16 = 1 << 3;
 pub(crate) const SELF_TEST: u16 = 1 << 5;
 pub(crate) const FLASH_CHECKSUM: u16 = 1 << 6;
 const ALARM_1: u16 = 1 << 8;
-/// Either alarm.
+/// The bits of both alarms.
 pub(crate) const ALARMS: u16 = ALARM_1 | ALARM_1 << 1;
 /// Self-test failure of gyro x; gyros y and z and the accelerometers follow.
 pub(crate) const GYRO_X: u16 = 1 << 10;
@@ -82,7 +82,7 @@ const SUPPLY_RANGE_V: (f64, f64) = (4.75, 5.25);
 /// Size of a count of SUPPLY_OUT, V.
 const SUPPLY_LSB: f64 = OutputRegister::Supply.lsb(0.0);
 
-/// The bits of DIAG_STAT that follow the supply without being read (data sheet Rev. B, page 15).
+/// The bits of DIAG_STAT that follow the supply without a read (data sheet Rev. B, page 15).
 pub(crate) const SUPPLY_FLAGS: u16 = SUPPLY_LOW | SUPPLY_HIGH;
 
 /// The bit of DIAG_STAT that the latest sample sets for its supply voltage.
@@ -101,13 +101,13 @@ pub(crate) fn check_supply(counts: &[i16; 12]) -> u16 {
 const ABOVE: u16 = 1 << 15;
 /// ALM_CTRL: compare filtered outputs.
 const COMPARE_FILTERED: u16 = 1 << 4;
-/// Length of the history: the latest output and as many as ALM_SMPL can count back.
+/// Length of the history: the latest output and as many earlier ones as ALM_SMPL can select.
 const HISTORY: usize = 256;
 
 /// The two alarms on the level or the rate of change of any output (data sheet Rev. B, Tables 24 to 26).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Alarms {
-    /// For each alarm the latest outputs of its source, the newest first.
+    /// The latest outputs of each alarm's source, newest first.
     history: [VecDeque<i16>; 2],
 }
 
@@ -127,7 +127,7 @@ impl Alarms {
             history.truncate(HISTORY);
             let rate_of_change = control >> (6 + index) & 1 != 0;
             let address = 2 * index as u8;
-            // 0x00 and 0x01 both mean one sample (Table 26).
+            // Both 0x00 and 0x01 mean one sample (Table 26).
             let back = usize::from(registers.read(registers::ALM_SMPL1 + address)).max(1);
             let watched = match (rate_of_change, history.get(back)) {
                 (false, _) => Some(i32::from(value)),
@@ -145,7 +145,7 @@ impl Alarms {
     }
 }
 
-/// Bits 13:0 of ALM_MAG in the format of the output: two's complement of 14 or 12 bits, or binary of 14 or 12.
+/// Bits 13:0 of ALM_MAG in the format of the output: two's complement or binary, of 14 or 12 bits.
 fn threshold(magnitude: u16, output: usize) -> i32 {
     let field = i32::from(magnitude & 0x3FFF);
     match output {

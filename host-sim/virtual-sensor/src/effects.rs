@@ -1,8 +1,9 @@
-//! Effects that the declared noise model (N, B, K) does not describe, injected where they arise in a real part.
+//! Effects that the declared noise model (N, B, K) does not include, injected where they arise in a real part.
 //!
-//! Most are sensed: they pass the digital filter and the quantization. Angle quantization and repeated outputs come after
-//! the filter, the sample clock is the part's, a filter setting is the controller's, and samples are dropped by the host.
-//! Each effect draws from a random stream of its own, so the noise is the same with and without it.
+//! Most effects are sensed: they pass the digital filter and the quantization. Angle quantization and repeated outputs
+//! come after the filter. The sample clock is the part's, a filter setting is the controller's, and the host drops
+//! samples.
+//! Each effect draws from its own random stream, so the noise is the same with and without it.
 
 use crate::environment::{Environment, EnvironmentSource, EnvironmentState};
 use crate::noise::{GaussMarkovProcess, NarrowBandProcess, TelegraphProcess};
@@ -11,20 +12,20 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// The first random stream of the environment and the effects; those below belong to the noise of the channels.
+/// The first random stream of the environment and the effects; lower ones belong to the noise of the channels.
 const FIRST_STREAM: u64 = 64;
 /// Limits of the ratio in [`InjectedEffect::SampleClock`].
 const CLOCK_RATIO_LIMITS: (f64, f64) = (0.5, 2.0);
 
-/// One effect, in the output `channel` where it has one. U is the unit of that output, such as °/s.
+/// One effect; `channel` is the affected output. U is the unit of that output, such as °/s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InjectedEffect {
     /// A spectral line, `amplitude·sin(2π·frequency·t + phase)`, which may lie above the Nyquist frequency and alias.
     Sinusoid {
         channel: OutputRegister,
-        /// Hz.
+        /// Frequency, Hz.
         frequency_hz: f64,
-        /// U.
+        /// Amplitude, U.
         amplitude: f64,
         /// Phase at time 0, rad.
         phase_rad: f64,
@@ -75,19 +76,19 @@ pub enum InjectedEffect {
     /// Sensitivity to the temperature of the [`Environment`].
     Temperature {
         channel: OutputRegister,
-        /// U/°C.
+        /// Sensitivity, U/°C.
         sensitivity: f64,
     },
     /// Sensitivity to the supply voltage of the [`Environment`].
     Supply {
         channel: OutputRegister,
-        /// U/V.
+        /// Sensitivity, U/V.
         sensitivity: f64,
     },
     /// Sensitivity to the specific force of the [`Environment`].
     Acceleration {
         channel: OutputRegister,
-        /// To the force along x, y and z, U/g.
+        /// Sensitivity to the force along x, y and z, U/g.
         sensitivity: [f64; 3],
     },
     /// A Gauss-Markov process that several channels share and that no output measures.
@@ -99,12 +100,12 @@ pub enum InjectedEffect {
         /// Standard deviation, U.
         deviation: f64,
     },
-    /// Single samples that are off by `size`, up or down, at random times.
+    /// Single samples with an error of `size`, up or down, at random times.
     Spikes {
         channel: OutputRegister,
-        /// Mean number in an hour.
+        /// Mean number per hour.
         rate_per_hour: f64,
-        /// U.
+        /// Size of a spike, U.
         size: f64,
     },
     /// A lasting change of the bias.
@@ -112,7 +113,7 @@ pub enum InjectedEffect {
         channel: OutputRegister,
         /// Time of the step, s from time 0.
         time_s: f64,
-        /// U.
+        /// Size of the step, U.
         size: f64,
     },
     /// The host misses samples at random.
@@ -120,12 +121,12 @@ pub enum InjectedEffect {
         /// Fraction of all samples, 0 to 1.
         fraction: f64,
     },
-    /// The outputs show the previous sample once more, flagged as new data, at random.
+    /// The outputs repeat the previous sample, flagged as new data, at random.
     RepeatedSamples {
         /// Fraction of all samples, 0 to 1.
         fraction: f64,
     },
-    /// The part's sample clock is off its nominal frequency.
+    /// The frequency of the part's sample clock is not the nominal one.
     SampleClock {
         /// True rate over nominal rate, ½ to 2.
         ratio: f64,
@@ -155,7 +156,7 @@ impl InjectedEffect {
         }
     }
 
-    /// The channels that show the effect; empty for an effect of the samples of all channels alike.
+    /// The channels that show the effect; empty if it affects the samples of all channels.
     pub fn channels(&self) -> &[OutputRegister] {
         match self {
             Self::Sinusoid { channel, .. }
@@ -178,12 +179,12 @@ impl InjectedEffect {
     }
 }
 
-/// Effects on a part besides its declared noise. Nothing by default.
+/// Effects on a part in addition to its declared noise; none by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SensorScenario {
-    /// Shown by the part's own outputs; without an effect no other channel depends on it.
+    /// The environment, which the part's own outputs show; no other channel depends on it without an effect.
     pub environment: Environment,
-    /// Effects that the noise model does not declare. Their order selects their random streams.
+    /// Effects that the noise model does not declare. Their order selects the random streams.
     pub effects: Vec<InjectedEffect>,
 }
 
@@ -247,7 +248,7 @@ enum EffectState {
 }
 
 impl EffectSource {
-    /// The same scenario and seed give the same values.
+    /// A source. The same scenario and seed give the same values.
     pub fn new(scenario: &SensorScenario, seed: u64) -> Self {
         let stream = |number: usize| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -297,13 +298,13 @@ impl EffectSource {
         })
     }
 
-    /// True if the outputs repeat the previous sample this time. To be called once a sample.
+    /// True if the outputs repeat the previous sample now. To be called once per sample.
     pub(crate) fn repeats_sample(&mut self) -> bool {
         let repeats = |active: &mut ActiveEffect| match active.effect {
             InjectedEffect::RepeatedSamples { fraction } => active.random.random_bool(probability(fraction)),
             _ => false,
         };
-        // Every effect draws at every sample, so that no stream depends on another.
+        // Every effect draws at every sample, so no stream depends on another.
         self.active.iter_mut().fold(false, |any, active| repeats(active) | any)
     }
 }
@@ -361,17 +362,17 @@ impl ActiveEffect {
     }
 }
 
-/// Keeps an angle in whole steps and gives the rate that is their difference.
+/// Rounds an angle to steps, and gives the rate that is the difference of the rounded angles.
 #[derive(Clone, Debug)]
 struct AngleQuantizer {
     /// Step of the angle, U·s.
     step: f64,
-    /// The true angle less the counted one, in steps; −½ to ½. Only this is kept, so a long record loses no digits.
+    /// The true angle less the rounded one, in steps, −½ to ½. Only this is stored, so a long record loses no digits.
     remainder: f64,
 }
 
 impl AngleQuantizer {
-    /// `coefficient` is Q: the standard deviation of an error that is uniform over a step of √12·Q.
+    /// `coefficient` is Q, the standard deviation of an error that is uniform over a step of √12·Q.
     fn new(coefficient: f64) -> Self {
         Self { step: 12f64.sqrt() * coefficient, remainder: 0.0 }
     }

@@ -1,4 +1,4 @@
-//! The environment of the part: temperature, supply voltage and motion, each a profile over time that the part's own
+//! The environment of the part: temperature, supply voltage and motion. Each is a profile over time that the part's own
 //! outputs show.
 
 use crate::noise::{GaussMarkovProcess, TelegraphProcess};
@@ -68,7 +68,7 @@ pub struct Motion {
 }
 
 impl Default for Motion {
-    /// At rest.
+    /// The part is at rest.
     fn default() -> Self {
         Self { deviation_g: 0.0, time_constant_s: 5.0 }
     }
@@ -79,7 +79,7 @@ impl Default for Motion {
 pub(crate) struct EnvironmentState {
     pub(crate) temperature_c: f64,
     pub(crate) supply_v: f64,
-    /// Along x, y and z.
+    /// Specific force along x, y and z, g.
     pub(crate) force_g: [f64; 3],
 }
 
@@ -102,7 +102,7 @@ impl EnvironmentSource {
         }
     }
 
-    /// The state at `time_s`, one period after the one before. Processes of size 0 draw no random numbers.
+    /// The state at `time_s`, one period after the previous state. Processes of size 0 draw no random numbers.
     pub(crate) fn next(&mut self, time_s: f64, period_s: f64) -> EnvironmentState {
         let Environment { temperature, supply, motion } = self.environment;
         let cycle = |period_s: f64| (2.0 * PI * time_s / period_s).sin();

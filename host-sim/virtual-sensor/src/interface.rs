@@ -1,4 +1,4 @@
-//! The part as its controller meets it: SPI words, registers with the side effects of reading and writing them, and pins.
+//! The interface of the part to its controller: SPI words, registers with the side effects of access, and pins.
 
 use crate::activity::{Activity, BusyAnswers};
 use crate::diagnosis;
@@ -25,31 +25,31 @@ const LEAST_WAKE_PULSE_NS: u64 = 20_000;
 const LEAST_SYNC_PULSE_NS: u64 = 5_000;
 /// Least period of the external sample clock, ns (Table 2, t3).
 const LEAST_SYNC_PERIOD_NS: u64 = 833_000;
-/// From the rising edge of the external sample clock to data ready, ns (Table 2, t2).
+/// Time from the rising edge of the external sample clock to data ready, ns (Table 2, t2).
 const SYNC_TO_DATA_READY_NS: u64 = 600_000;
-/// GPIO_CTRL: DIO4 is an output, and no input of a sample clock.
+/// GPIO_CTRL: DIO4 is an output, and so not the input of a sample clock.
 const DIO4_IS_OUTPUT: u16 = 1 << 3;
 /// A frame of ones.
 const DUMMY_FRAME: u16 = 0xFFFF;
-/// The write of 0 to the upper byte of GLOB_CMD.
+/// A write of 0 to the upper byte of GLOB_CMD.
 const SECOND_COMMAND_BYTE: u16 = 0xBF00;
 /// Size of a count of AUX_DAC, V.
 const AUX_DAC_LSB: f64 = 0.8059e-3;
 
-/// SPI.
+/// The SPI port.
 impl VirtualAdis16405 {
-    /// Sets SCK, Hz (at least 1); with `None` words take no time and the clock is not checked.
+    /// Sets SCK, Hz (at least 1). With `None`, words take no time and the clock is not checked.
     pub fn set_sck_hz(&mut self, sck_hz: Option<u32>) {
         self.spi.sck_hz = sck_hz.map(|hz| hz.max(1));
     }
 
-    /// Chip select falls.
+    /// Lets chip select fall.
     pub fn select(&mut self) {
         self.spi.select(self.now_ns);
     }
 
-    /// Chip select rises. An incomplete burst or frame is dropped; 20 µs or more of chip select low end a sleep, with or
-    /// without bytes (data sheet Rev. B, page 13 and Table 1).
+    /// Lets chip select rise. An incomplete burst or frame is dropped. 20 µs or more of chip select low end a sleep,
+    /// with or without bytes (data sheet Rev. B, page 13 and Table 1).
     pub fn deselect(&mut self) {
         self.wake_by_select(true);
         let end = self.spi.deselect(self.now_ns);
@@ -64,7 +64,7 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Ends a sleep if chip select has been low for long enough.
+    /// Ends a sleep if chip select has been low for the required time.
     fn wake_by_select(&mut self, is_rising: bool) {
         let Some(low_ns) = self.spi.wake_pulse_ns(self.now_ns).filter(|_| self.is_alive() && self.is_asleep()) else {
             return;
@@ -116,18 +116,18 @@ impl VirtualAdis16405 {
         shifted.answer
     }
 
-    /// The procedure under way, if it needs a silent bus.
+    /// The procedure under way if it needs a silent bus.
     fn silent_activity(&self) -> Option<Activity> {
         self.activity.map(|(activity, _)| activity).filter(|activity| activity.needs_silent_bus())
     }
 
-    /// Sets the word that goes out during a procedure that needs a silent bus.
+    /// Sets the word that is sent during a procedure that needs a silent bus.
     fn answer_while_busy(&mut self) {
         let word = match self.busy_answers {
             BusyAnswers::Zeros => 0,
             BusyAnswers::Ones => u16::MAX,
             BusyAnswers::Garbage => {
-                // Marsaglia's xorshift generator of 32 bits.
+                // Marsaglia's xorshift generator of 32 bits fills the answer.
                 self.garbage ^= self.garbage << 13;
                 self.garbage ^= self.garbage >> 17;
                 self.garbage ^= self.garbage << 5;
@@ -164,7 +164,7 @@ impl VirtualAdis16405 {
     }
 }
 
-/// Registers.
+/// The registers.
 impl VirtualAdis16405 {
     fn read(&mut self, address: u8) -> u16 {
         if !registers::readable(address) {
@@ -181,14 +181,14 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// All outputs, and from now on the erratum of [`read_output`](Self::read_output).
+    /// Reads all outputs. From then on the erratum of [`read_output`](Self::read_output) applies.
     fn read_burst(&mut self) -> [u16; 12] {
         self.burst_since_reset = true;
         std::array::from_fn(|index| self.read_output(index))
     }
 
-    /// Bit 15 new data, bit 14 error or alarm, below them the field. The erratum: after a burst read, a negative x rate
-    /// loses its sign while XGYRO_OFF is negative (EngineerZone, thread 81805).
+    /// Reads an output: bit 15 new data, bit 14 error or alarm, below them the field. The erratum: after a burst read,
+    /// a negative x rate loses its sign while XGYRO_OFF is negative (EngineerZone, thread 81805).
     fn read_output(&mut self, index: usize) -> u16 {
         let output = OutputRegister::ALL[index];
         let mut field = self.signal_chain.counts()[index] as u16 & (u16::MAX >> (16 - output.bits()));
@@ -234,8 +234,8 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Raises the taps of the filter to the least that the range allows: a range limits them, and so can change the filter
-    /// (data sheet Rev. B, page 14).
+    /// Raises the taps of the filter to the minimum of the range. So a range can change the filter (data sheet Rev. B,
+    /// page 14).
     fn lengthen_filter(&mut self) {
         let sens_avg = self.registers.read(registers::SENS_AVG);
         if let Some(least) = SensAvg::least_taps_log2(sens_avg).filter(|least| sens_avg & 0b111 < u16::from(*least)) {
@@ -263,8 +263,8 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Executes a write to GLOB_CMD. The first of several bits in this order counts: reset, precision auto-null, flash
-    /// update, DAC latch, factory restore, auto-null.
+    /// Executes a write to GLOB_CMD. If several bits are set, the first in this order counts: reset, precision
+    /// auto-null, flash update, DAC latch, factory restore, auto-null.
     fn command(&mut self, byte: u8) {
         match byte {
             reset if reset & 1 << 7 != 0 => {
@@ -281,10 +281,10 @@ impl VirtualAdis16405 {
     }
 }
 
-/// Pins.
+/// The pins.
 impl VirtualAdis16405 {
-    /// Level of DIO`line`, 1 to 4: the data-ready or alarm signal if one is assigned to the line, else the level that the
-    /// part or the outside drives. Other numbers read low.
+    /// Level of DIO`line`, 1 to 4. It is the data-ready or alarm signal if one is assigned to the line, else the level
+    /// that the part or the outside drives. Other numbers read low.
     pub fn pin(&self, line: u8) -> bool {
         let signal = |control: u16, active: bool| {
             let here = control & 0b100 != 0 && control & 1 == u16::from(line == 2) && (line == 1 || line == 2);
@@ -297,9 +297,9 @@ impl VirtualAdis16405 {
             .unwrap_or_else(|| (1..=4).contains(&line) && self.levels() >> (line - 1) & 1 != 0)
     }
 
-    /// Drives DIO`line`, 1 to 4, from outside. Without effect on a line that the part drives. With SMPL_PRD = 0 and
-    /// GPIO_CTRL\[3\] = 0 DIO4 is the external sample clock: 600 µs after it rises a sample is taken, if it stays high for 5 µs and
-    /// has not risen in the 833 µs before (data sheet Rev. B, Table 2, Figure 4 and page 14).
+    /// Drives DIO`line`, 1 to 4, from outside; has no effect on a line that the part drives. With SMPL_PRD = 0 and GPIO_CTRL\[3\] = 0, DIO4
+    /// is the external sample clock. A sample is taken 600 µs after it rises if it stays high for 5 µs and has not risen in the 833 µs
+    /// before (data sheet Rev. B, Table 2, Figure 4 and page 14).
     pub fn drive_pin(&mut self, line: u8, high: bool) {
         if let 1..=4 = line {
             let bit = 1 << (line - 1);
@@ -311,7 +311,7 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// An edge of the external sample clock.
+    /// Handles an edge of the external sample clock.
     fn clock_edge(&mut self, rising: bool) {
         if self.registers.read(registers::GPIO_CTRL) & DIO4_IS_OUTPUT != 0 {
             return;
@@ -335,12 +335,12 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Voltage of the auxiliary analog output, V: AUX_DAC when it was last latched.
+    /// Voltage of the auxiliary analog output, V, by the AUX_DAC that was latched last.
     pub fn aux_output_v(&self) -> f64 {
         f64::from(self.latched_dac) * AUX_DAC_LSB
     }
 
-    /// Levels of the lines, bit 0 for DIO1: driven by the part where GPIO_CTRL makes them outputs, else from outside.
+    /// Levels of the lines, bit 0 for DIO1: driven by the part if GPIO_CTRL makes them outputs, else from outside.
     fn levels(&self) -> u16 {
         let control = self.registers.read(registers::GPIO_CTRL);
         let outputs = control & 0xF;

@@ -1,15 +1,15 @@
 //! A virtual ADIS16405 at register level, in virtual time.
 //!
-//! [`VirtualAdis16405`] is the part: noise, injected effects, digital filter, quantization, every register with its side
-//! effects, flash, self-test, auto-null, alarms, sleep, pins, SPI protocol, and a checker of the bus timing. Its register
-//! map is that of the data sheet and shares no code with the driver. [`EmulatedBus`] puts it behind an embedded-hal
-//! [`SpiDevice`](embedded_hal::spi::SpiDevice), over which the driver reads it.
+//! [`VirtualAdis16405`] is the part: noise, injected effects, digital filter, quantization, every register with its
+//! side effects, flash, self-test, auto-null, alarms, sleep, pins, SPI protocol, and a checker of the bus timing. Its
+//! register map is that of the data sheet and shares no code with the driver. [`EmulatedBus`] connects it to the driver
+//! as an embedded-hal [`SpiDevice`](embedded_hal::spi::SpiDevice).
 //!
-//! Facts are those of the data sheet ADIS16400/ADIS16405 Rev. B, with page, table or figure where it matters. A controller that
-//! addresses the part too soon or clocks it too fast reads garbage and is not heard ([`Violation`]); what drivers of real parts
-//! do and the sheet neither shows nor forbids is accepted with a [`Note`]. [`Strictness`] changes both.
+//! Facts are those of the data sheet ADIS16400/ADIS16405 Rev. B, with page, table or figure. If a controller addresses the part too soon or
+//! clocks it too fast, it reads garbage and its frames are not executed ([`Violation`]). What drivers of real parts do and the data sheet
+//! neither shows nor forbids is accepted with a [`Note`]. [`Strictness`] changes both.
 //!
-//! Behaviour of real parts that a forgiving model lacks, each off unless it is asked for:
+//! These behaviours of real parts are off by default:
 //!
 //! | the part is | by |
 //! |---|---|

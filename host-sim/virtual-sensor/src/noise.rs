@@ -1,5 +1,5 @@
-//! Noise with declared coefficients (white noise, flicker noise, random walk and a constant value, by channel), and the
-//! random processes that effects and environment are made of.
+//! Noise with declared coefficients per channel (white noise, flicker noise, random walk and a constant value), and the
+//! random processes of effects and environment.
 
 use crate::registers::OutputRegister;
 use rand::{Rng, SeedableRng};
@@ -25,7 +25,7 @@ pub struct ChannelNoise {
 pub struct NoiseModel {
     /// Channels in burst order.
     pub channels: [ChannelNoise; 12],
-    /// Flicker noise is generated for averaging times up to this one, s.
+    /// Longest averaging time for which flicker noise is generated, s.
     pub longest_tau_s: f64,
 }
 
@@ -94,7 +94,7 @@ pub struct NoiseSource {
 }
 
 impl NoiseSource {
-    /// Each channel has a ChaCha8 stream of its own, so its noise does not depend on that of the others.
+    /// A source. Each channel has its own ChaCha8 stream, so its noise does not depend on other channels.
     pub fn new(model: &NoiseModel, seed: u64, sample_period_s: f64) -> Self {
         let channels = std::array::from_fn(|index| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -114,7 +114,7 @@ impl NoiseSource {
         source
     }
 
-    /// Changes the time between samples, s. The random walks go on from where they are; flicker noise starts anew.
+    /// Changes the time between samples, s. The random walks continue; flicker noise starts again.
     pub fn set_sample_period(&mut self, sample_period_s: f64) {
         for channel in &mut self.channels {
             channel.set_sample_period(sample_period_s);
@@ -180,7 +180,7 @@ impl ChannelSource {
     }
 }
 
-/// One of the Gauss-Markov processes, an octave of correlation time apart, that sum to flicker noise.
+/// One of the Gauss-Markov processes that sum to flicker noise. Their correlation times are an octave apart.
 #[derive(Clone, Copy, Debug)]
 struct FlickerOctave {
     state: f64,
@@ -189,12 +189,12 @@ struct FlickerOctave {
 }
 
 impl FlickerOctave {
-    /// A process of variance v and correlation time T has the one-sided density 4vT/(1 + (2πfT)²). Summed over
-    /// d(ln T)/ln 2 processes that is v/(f·ln 2); equal to B²/(πf) if v = B²·ln 2/π.
+    /// A process of variance v and correlation time T has the one-sided density 4vT/(1 + (2πfT)²). Summed over d(ln
+    /// T)/ln 2 processes this is v/(f·ln 2), which equals B²/(πf) for v = B²·ln 2/π.
     fn new(bias_instability: f64, periods_per_correlation: f64, random: &mut ChaCha8Rng) -> Self {
         let sigma = bias_instability * (std::f64::consts::LN_2 / PI).sqrt();
         let decay = (-periods_per_correlation).exp();
-        // 1 − decay², without cancellation for long correlation times.
+        // This is 1 − decay², without cancellation for long correlation times.
         let drive = sigma * (-(-2.0 * periods_per_correlation).exp_m1()).sqrt();
         Self { state: sigma * standard_normal(random), decay, drive }
     }
@@ -212,11 +212,11 @@ impl GaussMarkovProcess {
         Self { time_constant_s, state: None }
     }
 
-    /// The value one period after the one before.
+    /// The value one period after the previous one.
     pub(crate) fn next(&mut self, period_s: f64, random: &mut ChaCha8Rng) -> f64 {
         let periods = period_s / self.time_constant_s;
         let state = match self.state {
-            // √(1 − decay²) by exp_m1, without cancellation for long correlation times.
+            // `exp_m1` gives √(1 − decay²) without cancellation for long correlation times.
             Some(state) => (-periods).exp() * state + (-(-2.0 * periods).exp_m1()).sqrt() * standard_normal(random),
             None => standard_normal(random),
         };
@@ -240,7 +240,7 @@ impl NarrowBandProcess {
         Self { frequency_hz, quadratures: [envelope.clone(), envelope] }
     }
 
-    /// The value at `time_s`, one period after the one before.
+    /// The value at `time_s`, one period after the previous one.
     pub(crate) fn next(&mut self, time_s: f64, period_s: f64, random: &mut ChaCha8Rng) -> f64 {
         let (sin, cos) = (2.0 * PI * (self.frequency_hz * time_s).fract()).sin_cos();
         let [in_phase, quadrature] = &mut self.quadratures;
@@ -260,9 +260,9 @@ impl TelegraphProcess {
         Self { time_constant_s, high: None }
     }
 
-    /// The value one period after the one before.
+    /// The value one period after the previous one.
     pub(crate) fn next(&mut self, period_s: f64, random: &mut ChaCha8Rng) -> f64 {
-        // Probability of an odd number of jumps in a period: the covariance is exp(−t/T) for T of any length.
+        // The probability of an odd number of jumps in a period gives the covariance exp(−t/T) for any T.
         let odd = -0.5 * (-period_s / self.time_constant_s).exp_m1();
         let high = match self.high {
             Some(high) => high ^ random.random_bool(odd),

@@ -1,16 +1,16 @@
-//! Noise that is generated before it is needed, on other threads.
+//! Noise that other threads generate before it is needed.
 //!
-//! The values are those that [`NoiseSource`] gives sample by sample. They depend on the sample period alone, which the controller
-//! programs: where it changes, the channels go back to the last sample that was taken.
+//! The values are those of [`NoiseSource`] sample by sample. They depend only on the sample period, which the controller programs. If it
+//! changes, the channels return to the last sample taken.
 
 use crate::noise::{ChannelSource, NoiseSource};
 use crate::registers::OutputRegister;
 use std::thread::{self, JoinHandle};
 
-/// Samples of the longest block: those of three gyros take about 2 ms, a hundred times what it takes to start a thread.
+/// Samples of the longest block. Those of three gyros take about 2 ms, a hundred times the start of a thread.
 const LONGEST: usize = 1 << 12;
 
-/// The noise of all channels, in two groups that have about the same work.
+/// The noise of all channels, in two groups with about the same work.
 #[derive(Clone, Debug)]
 pub(crate) struct NoiseAhead {
     groups: [ChannelGroup; 2],
@@ -23,12 +23,12 @@ impl NoiseAhead {
         Self { groups: [first, second].map(ChannelGroup::new) }
     }
 
-    /// As [`NoiseSource::set_sample_period`].
+    /// Sets the time between samples, s, as [`NoiseSource::set_sample_period`] does.
     pub(crate) fn set_sample_period(&mut self, sample_period_s: f64) {
         self.groups.iter_mut().for_each(|group| group.set_sample_period(sample_period_s));
     }
 
-    /// As [`NoiseSource::sample`].
+    /// The next value of every channel, as [`NoiseSource::sample`] gives it.
     pub(crate) fn sample(&mut self) -> [f64; 12] {
         let mut values = [0.0; 12];
         let mut rest = values.iter_mut();
@@ -40,18 +40,18 @@ impl NoiseAhead {
     }
 }
 
-/// Some channels, block by block.
+/// A group of channels, block by block.
 #[derive(Debug)]
 struct ChannelGroup {
     block: Block,
-    /// Samples of the block that were taken.
+    /// Number of samples of the block that were taken.
     taken: usize,
-    /// Generates the block that follows, once the blocks have reached their full length.
+    /// The thread that generates the next block, once blocks have their full length.
     ahead: Option<JoinHandle<Block>>,
 }
 
 impl Clone for ChannelGroup {
-    /// The clone generates the block that follows itself.
+    /// The clone generates its next block itself.
     fn clone(&self) -> Self {
         Self { block: self.block.clone(), taken: self.taken, ahead: None }
     }
@@ -76,12 +76,12 @@ impl ChannelGroup {
         self.taken += 1;
     }
 
-    /// The sample that was taken last, of every channel.
+    /// The latest sample of every channel.
     fn latest(&self) -> impl Iterator<Item = f64> {
         self.block.values.chunks_exact(self.block.samples).map(|of_channel| of_channel[self.taken - 1])
     }
 
-    /// Each block has twice the length of the one before, so that little is generated in vain for a part that takes few samples.
+    /// Starts the next block. It is twice as long as the one before, so that a part with few samples wastes little.
     fn begin_block(&mut self) {
         let samples = (2 * self.block.samples).clamp(1, LONGEST);
         let ahead = self.ahead.take().and_then(|thread| thread.join().ok());
@@ -100,7 +100,7 @@ impl ChannelGroup {
 struct Block {
     /// The channels before the first sample.
     before: Vec<ChannelSource>,
-    /// The channels behind the last one.
+    /// The channels after the last sample.
     behind: Vec<ChannelSource>,
     samples: usize,
     /// All samples of the first channel, then those of the others.
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
     use crate::noise::NoiseModel;
 
-    /// Samples over every length of a block, and over three blocks that threads generate.
+    /// Number of samples, which includes every length of a block and three blocks of threads.
     const SAMPLES: usize = 5 * LONGEST;
 
     #[test]
@@ -139,7 +139,8 @@ mod tests {
     fn a_sample_period_holds_from_the_sample_on_before_which_it_is_set() {
         let mut source = NoiseSource::new(&NoiseModel::paper(), 7, 0.005);
         let mut ahead = NoiseAhead::new(source.clone());
-        // Before the first sample, twice in a row, inside a block, at the end of one (1 + 2 + 4 samples), and ahead of a thread.
+        // Changes occur before the first sample, twice in a row, inside a block, at the end of one (1 + 2 + 4 samples), and while a thread
+        // generates.
         for (samples, period_s) in [(0, 0.01), (0, 0.02), (5, 0.01), (7, 0.005), (3 * LONGEST, 0.01), (10, 0.02)] {
             for _ in 0..samples {
                 assert_eq!(ahead.sample(), source.sample());

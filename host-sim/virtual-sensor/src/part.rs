@@ -1,4 +1,4 @@
-//! The virtual part: its state, how time passes in it, and its procedures.
+//! The virtual part: its state, its time, and its procedures.
 
 use crate::activity::{Activity, BusyAnswers};
 use crate::diagnosis::{self, Alarms};
@@ -12,19 +12,20 @@ use crate::spi::{BusLog, NORMAL_MODE_MAX_SMPL_PRD, Note, SpiPort, Violation, Vio
 const TICK_SIXTEENTHS: u64 = 9_765_625;
 /// Ticks in the slow time base of SMPL_PRD, 18.921 ms.
 const SLOW_TICKS: u64 = 31;
-/// Data ready enabled, MSC_CTRL.
+/// MSC_CTRL: data ready is enabled.
 const DATA_READY_ENABLED: u16 = 1 << 2;
 
 /// An ADIS16405 in virtual time.
 ///
-/// The caller moves time with [`advance_to`](Self::advance_to); samples are taken at the programmed rate. A bus calls
-/// [`select`](Self::select), [`transfer`](Self::transfer) or [`transfer_byte`](Self::transfer_byte), and
-/// [`deselect`](Self::deselect); each acts at [`now`](Self::now). With a known SCK ([`set_sck_hz`](Self::set_sck_hz)) every
-/// byte takes eight of its periods; without, words take no time and the clock is not checked.
+/// The caller advances time with [`advance_to`](Self::advance_to); samples are taken at the programmed rate. A bus
+/// calls [`select`](Self::select), [`transfer`](Self::transfer) or [`transfer_byte`](Self::transfer_byte), and
+/// [`deselect`](Self::deselect), each of which acts at [`now`](Self::now). If SCK is known
+/// ([`set_sck_hz`](Self::set_sck_hz)), every byte takes eight of its periods. Otherwise words take no time and the
+/// clock is not checked.
 #[derive(Clone, Debug)]
 pub struct VirtualAdis16405 {
     pub(crate) now_ns: u64,
-    /// Sixteenths of a ns; `None` while the part does not sample by itself.
+    /// Time of the next sample in sixteenths of a ns; `None` while the part does not sample by itself.
     pub(crate) next_sample_sixteenths: Option<u64>,
     pub(crate) sampled_at_ns: Option<u64>,
     pub(crate) powered: bool,
@@ -45,29 +46,29 @@ pub struct VirtualAdis16405 {
     pub(crate) garbage: u32,
     /// Duration of the start-up, ns; `None` for that of the power mode.
     pub(crate) start_up_ns: Option<u64>,
-    /// When the reset line fell, ns; `None` while it is high.
+    /// Time at which the reset line fell, ns; `None` while it is high.
     pub(crate) reset_low_since_ns: Option<u64>,
-    /// Outputs that have not been read since the latest sample.
+    /// True for outputs that have not been read since the latest sample.
     pub(crate) new_data: [bool; 12],
-    /// Every so many samples the outputs other than the inertial ones are refreshed.
+    /// Number of samples between refreshes of the outputs that are not inertial.
     pub(crate) slow_refresh: u32,
     /// DIAG_STAT.
     pub(crate) diagnosis: u16,
     pub(crate) burst_since_reset: bool,
     samples: u64,
-    /// `samples` at the latest reset: the first sample after it refreshes all outputs.
+    /// `samples` at the latest reset; the first sample after it refreshes all outputs.
     samples_at_reset: u64,
-    /// Levels that DIO1 (bit 0) to DIO4 are driven to from outside.
+    /// Levels of DIO1 (bit 0) to DIO4 that are driven from outside.
     pub(crate) driven: u16,
     pub(crate) latched_dac: u16,
-    /// When the external sample clock rose last, ns.
+    /// Time at which the external sample clock rose last, ns.
     pub(crate) clock_rose_at_ns: Option<u64>,
     pub(crate) spi: SpiPort,
     pub(crate) bus_log: BusLog,
 }
 
 impl VirtualAdis16405 {
-    /// A part just after its start-up, with reset values, at time 0. The same model and seed give the same samples.
+    /// A part just after its start-up at time 0, with reset values. The same model and seed give the same samples.
     pub fn new(model: NoiseModel, seed: u64) -> Self {
         Self::with_scenario(&SensorScenario::default(), model, seed)
     }
@@ -79,7 +80,7 @@ impl VirtualAdis16405 {
         part
     }
 
-    /// The same part in an environment and with effects that its noise model does not declare.
+    /// The part of [`new`](Self::new) in an environment and with effects that its noise model does not declare.
     pub fn with_scenario(scenario: &SensorScenario, model: NoiseModel, seed: u64) -> Self {
         let mut part = Self {
             now_ns: 0,
@@ -121,7 +122,7 @@ impl VirtualAdis16405 {
         self.now_ns
     }
 
-    /// Advances time to `ns`: takes the samples and ends the procedure that fall due. Without effect if `ns` is earlier than
+    /// Advances time to `ns`: takes the samples and ends the procedure that are due. Has no effect if `ns` is before
     /// [`now`](Self::now).
     pub fn advance_to(&mut self, ns: u64) {
         loop {
@@ -166,7 +167,7 @@ impl VirtualAdis16405 {
         self.bus_log.violation_count
     }
 
-    /// The first thousand notes on what the part has accepted although the data sheet does not show it, oldest first.
+    /// The first thousand notes on accepted behaviour that the data sheet does not show, oldest first.
     pub fn notes(&self) -> &[Note] {
         &self.bus_log.notes
     }
@@ -180,7 +181,7 @@ impl VirtualAdis16405 {
         self.next_sample_sixteenths.map_or(u64::MAX, |sixteenths| sixteenths.div_ceil(16))
     }
 
-    /// True if the samples that the part takes reach no output.
+    /// True if samples reach no output.
     fn is_offline(&self) -> bool {
         self.activity.is_some_and(|(activity, _)| activity.is_offline())
     }
@@ -211,8 +212,8 @@ impl VirtualAdis16405 {
         );
     }
 
-    /// By how much a procedure takes longer at the present sample period. That of the self-test is stated for SMPL_PRD = 0x01
-    /// (data sheet Rev. B, Table 1); it is taken as so many samples, which is the longer one elsewhere.
+    /// Factor on the duration of a procedure at the present sample period. The duration of the self-test is stated for SMPL_PRD = 0x01
+    /// (data sheet Rev. B, Table 1) and counted in samples here, the longer choice at other periods.
     fn lengthening(&self, activity: Activity) -> u64 {
         match (activity, self.period_sixteenths()) {
             (Activity::SelfTest, Some(period)) => period.div_ceil(2 * TICK_SIXTEENTHS),
@@ -229,7 +230,7 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Switches the power off, or disconnects the part: it does not sample, and the controller reads ones.
+    /// Switches the power off, or disconnects the part. It does not sample, and the controller reads ones.
     pub fn power_off(&mut self) {
         self.powered = false;
         self.activity = None;
@@ -237,9 +238,9 @@ impl VirtualAdis16405 {
         self.reset();
     }
 
-    /// Switches the power on: the part starts up, for 220 ms, or for 290 ms if the SMPL_PRD in its flash selects low-power
-    /// mode ([`set_start_up_ns`](Self::set_start_up_ns) sets another time). Until then the controller must not use the bus;
-    /// what it reads if it does is set by [`set_busy_answers`](Self::set_busy_answers).
+    /// Switches the power on. The part starts up for 220 ms, or for 290 ms if the SMPL_PRD in its flash selects
+    /// low-power mode ([`set_start_up_ns`](Self::set_start_up_ns) changes this). The controller must not use the bus
+    /// before; [`set_busy_answers`](Self::set_busy_answers) sets what it reads if it does.
     pub fn power_on(&mut self) {
         self.powered = true;
         self.reset();
@@ -272,7 +273,7 @@ impl VirtualAdis16405 {
             }
             Activity::FlashTest if self.flash_damaged => self.diagnosis |= diagnosis::FLASH_CHECKSUM,
             Activity::FlashUpdate => self.write_flash(),
-            // Each sets all sensor data to 0 and updates the flash by itself (data sheet Rev. B, page 13).
+            // Each sets all sensor data to 0 and also updates the flash (data sheet Rev. B, page 13).
             Activity::FactoryRestore | Activity::AutoNull | Activity::PrecisionAutoNull => {
                 match activity {
                     Activity::FactoryRestore => self.registers.restore_calibration(),
@@ -289,7 +290,7 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Copies the registers to the flash; it needs the supply in its window (data sheet Rev. B, page 10).
+    /// Copies the registers to the flash, which needs the supply in its window (data sheet Rev. B, page 10).
     fn write_flash(&mut self) {
         let has_sampled = self.samples > self.samples_at_reset;
         if self.flash_damaged || has_sampled && diagnosis::check_supply(self.signal_chain.counts()) != 0 {
@@ -301,7 +302,7 @@ impl VirtualAdis16405 {
         self.flash.copy_flash_registers(&self.registers);
     }
 
-    /// Starts the sample clock anew, unless it is external: the first sample comes one period after `from_ns`.
+    /// Restarts the sample clock unless it is external: the first sample comes one period after `from_ns`.
     pub(crate) fn restart_sampling(&mut self, from_ns: u64) {
         let may_sample = self.activity.is_none_or(|(activity, _)| activity.keeps_sampling());
         self.next_sample_sixteenths =
@@ -311,7 +312,7 @@ impl VirtualAdis16405 {
             });
     }
 
-    /// Sample period by SMPL_PRD and the true rate of the clock; `None` for the external clock.
+    /// Sample period by SMPL_PRD and the true rate of the clock; `None` if the clock is external.
     fn period_sixteenths(&self) -> Option<u64> {
         let smpl_prd = u64::from(self.registers.read(registers::SMPL_PRD));
         let base = if smpl_prd & 0x80 == 0 { 1 } else { SLOW_TICKS };
@@ -356,7 +357,7 @@ impl VirtualAdis16405 {
         self.diagnosis = self.diagnosis & !diagnosis::SUPPLY_FLAGS | found | self.held_flags;
     }
 
-    /// Takes a sample by the external clock; its period is the time since the sample before.
+    /// Takes a sample by the external clock; its period is the time since the previous sample.
     pub(crate) fn sample_externally(&mut self) {
         if self.activity.is_some_and(|(activity, _)| !activity.keeps_sampling()) || !self.is_alive() {
             return;

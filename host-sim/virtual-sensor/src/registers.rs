@@ -1,5 +1,5 @@
-//! The register map of the data sheet, and the contents of the registers. It is written down independently of the
-//! driver's, so that the tests of one against the other show a wrong entry in either.
+//! The register map of the data sheet, and the contents of the registers. It is written independently of the driver's,
+//! so that tests of one against the other reveal a wrong entry in either.
 
 /// An output register, in the order of a burst read (SUPPLY_OUT at 0x02 to AUX_ADC at 0x18).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -62,7 +62,7 @@ impl OutputRegister {
         }
     }
 
-    /// Least and greatest count: two's complement, but offset binary for supply and auxiliary input.
+    /// Least and greatest count: two's complement, but unsigned for supply and auxiliary input.
     pub(crate) const fn limits(self) -> (i16, i16) {
         match self {
             Self::Supply | Self::AuxAdc => (0, (1 << self.bits()) - 1),
@@ -70,7 +70,8 @@ impl OutputRegister {
         }
     }
 
-    /// Size of one count in the unit of the output; `gyro_lsb` is that of the gyros, °/s, which the range sets.
+    /// Size of one count in the unit of the output; `gyro_lsb` is the size for the gyros, °/s, which depends on the
+    /// range.
     pub(crate) const fn lsb(self, gyro_lsb: f64) -> f64 {
         match self {
             Self::Supply => 2.418e-3,
@@ -109,11 +110,11 @@ enum Access {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Storage {
-    /// Lost in a reset.
+    /// The value is lost in a reset.
     Volatile,
-    /// Backed up in flash.
+    /// The value is backed up in flash.
     Flash,
-    /// Backed up in flash; two's complement, which reads back sign-extended to 16 bits.
+    /// The value is backed up in flash; two's complement, read back with its sign extended to 16 bits.
     FlashSigned,
 }
 
@@ -192,8 +193,8 @@ const REGISTER_MAP: [Entry; 39] = {
     ]
 };
 
-/// Offsets and hard-iron corrections, Tables 10 to 12: the registers that a factory restore sets to 0 (data sheet Rev. B, page
-/// 13, where "Figure 12" stands for Table 12).
+/// Offsets and hard-iron corrections, which a factory restore sets to 0 (data sheet Rev. B, Tables 10 to 12; page 13 calls Table 12 "Figure
+/// 12").
 const CALIBRATION: std::ops::RangeInclusive<u8> = XGYRO_OFF..=0x2A;
 
 fn find(address: u8) -> Option<&'static Entry> {
@@ -210,12 +211,12 @@ pub(crate) fn writable(address: u8) -> bool {
     find(address).is_some_and(|entry| entry.access != Access::Read && (address & 1 == 0 || entry.bits > 8))
 }
 
-/// True if `address` is that of the upper byte of a register of 8 bits that can be written.
+/// True if `address` is the upper byte of a writable register of 8 bits.
 pub(crate) fn is_unused_byte(address: u8) -> bool {
     address & 1 == 1 && find(address).is_some_and(|entry| entry.access != Access::Read && entry.bits <= 8)
 }
 
-/// The contents of the registers, as a read gives them: those of signed ones with their sign extended.
+/// The contents of the registers as a read returns them; signed ones have their sign extended.
 #[derive(Clone, Debug)]
 pub(crate) struct RegisterFile {
     words: [u16; 0x40],
@@ -231,7 +232,7 @@ impl RegisterFile {
         Self { words }
     }
 
-    /// The word that a read of `address` (of either byte) gives; 0 where there is no register.
+    /// The word that a read of `address` (of either byte) returns; 0 if there is no register.
     pub(crate) fn read(&self, address: u8) -> u16 {
         self.words[usize::from(address & 0x7F) / 2]
     }
@@ -241,14 +242,14 @@ impl RegisterFile {
         f64::from(self.read(address) as i16)
     }
 
-    /// Writes one byte, as a write frame does; bits outside the width of the register are dropped.
+    /// Writes one byte, as a write frame does. Bits outside the register's width are dropped.
     pub(crate) fn write_byte(&mut self, address: u8, byte: u8) {
         let [upper, lower] = self.words[usize::from(address & 0x7F) / 2].to_be_bytes();
         let written = if address & 1 == 0 { [upper, byte] } else { [byte, lower] };
         self.store(address, u16::from_be_bytes(written));
     }
 
-    /// Sets a whole register, as the part itself does; bits outside the width of the register are dropped.
+    /// Sets a whole register, as the part itself does. Bits outside the register's width are dropped.
     pub(crate) fn store(&mut self, address: u8, word: u16) {
         if let Some(entry) = find(address) {
             let shift = 16 - entry.bits;

@@ -1,4 +1,4 @@
-//! The signal chain, from the sensed values to counts: noise, effects, self-test stimulus, digital filter, corrections,
+//! The signal chain from sensed values to counts: noise, effects, self-test stimulus, digital filter, corrections,
 //! quantization.
 
 use crate::effects::{EffectSource, SensorScenario};
@@ -14,8 +14,8 @@ const ACCL_OFFSET_LSB: f64 = 3.33e-3;
 const HARD_IRON_LSB: f64 = 0.5e-3;
 /// Soft-iron factor of 1, in counts.
 const SOFT_IRON_ONE: f64 = 2048.0;
-/// Response to the stimulus of the self-test, °/s and g. Assumed: page 15 of the data sheet (Rev. B) refers to Table 1 for it,
-/// and Table 1 has none.
+/// Response to the stimulus of the self-test, °/s and g. The values are assumptions: page 15 of the data sheet (Rev. B) refers to Table 1
+/// for them, which has none.
 const STIMULUS: [(OutputRegister, f64); 6] = [
     (OutputRegister::GyroX, 40.0),
     (OutputRegister::GyroY, 40.0),
@@ -58,7 +58,7 @@ impl SignalChain {
         &self.unfiltered
     }
 
-    /// The filtered rates of the latest sample about x, y and z, before the offsets are added, °/s.
+    /// The filtered rates of the latest sample about x, y and z before the offsets are added, °/s.
     pub(crate) fn rates(&self) -> [f64; 3] {
         self.rates
     }
@@ -85,8 +85,8 @@ impl SignalChain {
         self.filters = std::array::from_fn(|_| CascadedBoxFilter::new(taps));
     }
 
-    /// Takes the sample at `time_s`, with the sensors deflected by `stimulus`. Outputs that are not inertial keep their counts
-    /// unless `slow_due`. The random numbers drawn do not depend on the registers.
+    /// Takes the sample at `time_s`, with the sensors deflected by `stimulus`. Outputs that are not inertial keep their counts unless
+    /// `slow_due`. The random numbers do not depend on the registers.
     pub(crate) fn sample(
         &mut self,
         registers: &RegisterFile,
@@ -129,14 +129,14 @@ fn quantize(channel: OutputRegister, gyro_lsb: f64, value: f64) -> i16 {
 /// The force that a self-test applies to the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stimulus {
-    /// To gyros and accelerometers.
+    /// The force acts on gyros and accelerometers.
     Positive,
-    /// To gyros: Table 22 of the data sheet (Rev. B) names no others.
+    /// The force acts on gyros: Table 22 of the data sheet (Rev. B) names no other sensors.
     NegativeGyros,
 }
 
 impl Stimulus {
-    /// That of the manual self-test, MSC_CTRL bits 8 and 9.
+    /// The stimulus of the manual self-test, MSC_CTRL bits 8 and 9.
     pub(crate) fn manual(registers: &RegisterFile) -> Option<Self> {
         match registers.read(registers::MSC_CTRL) >> 8 & 0b11 {
             0b01 => Some(Self::Positive),
@@ -146,8 +146,8 @@ impl Stimulus {
     }
 }
 
-/// Adds the response to a stimulus. By the words of Table 22 the output of a gyro rises with the negative stimulus and falls
-/// with the positive one; the sign here is that of the stimulus.
+/// Adds the response to a stimulus. By the text of Table 22 the output of a gyro rises with the negative stimulus and
+/// falls with the positive one. The sign here is that of the stimulus.
 fn stimulate(values: &mut [f64; 12], stimulus: Stimulus) {
     for (channel, response) in STIMULUS {
         match stimulus {
@@ -180,24 +180,23 @@ fn has_filter(channel: OutputRegister) -> bool {
     !matches!(channel, OutputRegister::Supply | OutputRegister::Temp | OutputRegister::AuxAdc)
 }
 
-/// The digital filter of one channel: two cascaded averages of N = 2^M samples each, and a delay of one sample. Together they
-/// are the Bartlett window of 2N + 1 taps, of which the first and the last are 0, with a phase of N samples (data sheet Rev. B,
-/// Figure 15).
+/// The digital filter of one channel: two cascaded averages of N = 2^M samples each, and a delay of one sample. Together they are the
+/// Bartlett window of 2N + 1 taps, whose first and last tap are 0, with a phase of N samples (data sheet Rev. B, Figure 15).
 #[derive(Clone, Debug)]
 pub struct CascadedBoxFilter {
     stages: [MovingAverage; 2],
-    /// The output that is due with the next sample.
+    /// The output for the next sample.
     due: Option<f64>,
 }
 
 impl CascadedBoxFilter {
-    /// `taps_log2` is M, 0 to 6 in the part; M = 0 delays alone.
+    /// `taps_log2` is M, 0 to 6 in the part; with M = 0 the filter only delays.
     pub fn new(taps_log2: u8) -> Self {
         let stage = MovingAverage { window: vec![0.0; 1 << taps_log2], position: 0, filled: false };
         Self { stages: [stage.clone(), stage], due: None }
     }
 
-    /// Filters one value. The first value stands for all before it as well, so there is no transient from zero.
+    /// Filters one value. The first value also stands for all earlier ones, so there is no transient from zero.
     pub fn filter(&mut self, value: f64) -> f64 {
         let [first, second] = &mut self.stages;
         let filtered = second.push(first.push(value));
@@ -220,7 +219,7 @@ impl MovingAverage {
         }
         self.window[self.position] = value;
         self.position = (self.position + 1) % self.window.len();
-        // Summed anew for each sample: rounding errors of a running sum would grow over a long simulation.
+        // The sum is computed for each sample: the rounding errors of a running sum would grow over a long simulation.
         self.window.iter().sum::<f64>() / self.window.len() as f64
     }
 }
@@ -231,13 +230,13 @@ pub(crate) struct SensAvg {
     pub(crate) gyro_lsb: f64,
     /// M, 0 to 6.
     pub(crate) taps_log2: u8,
-    /// False for a range that does not exist, or with fewer taps than the range needs.
+    /// False if the range does not exist or has fewer taps than it needs.
     pub(crate) valid: bool,
 }
 
 impl SensAvg {
-    /// Decodes the register. For an invalid setting, for which no source tells what a real part does, the range is
-    /// ±300 °/s; the taps are at most 2⁶.
+    /// Decodes the register. No source tells what a real part does at an invalid setting; here the range is ±300 °/s
+    /// and the taps are at most 2⁶.
     pub(crate) fn decode(registers: &RegisterFile) -> Self {
         let sens_avg = registers.read(registers::SENS_AVG);
         let taps = (sens_avg & 0b111) as u8;
@@ -250,7 +249,8 @@ impl SensAvg {
         Self { gyro_lsb, taps_log2: taps.min(6), valid }
     }
 
-    /// The smallest M that the range of a SENS_AVG value allows (data sheet Rev. B, Table 17); `None` for no range.
+    /// The smallest M that the range of a SENS_AVG value allows (data sheet Rev. B, Table 17); `None` if there is no
+    /// such range.
     pub(crate) fn least_taps_log2(sens_avg: u16) -> Option<u8> {
         match sens_avg >> 8 {
             0b100 => Some(0),
@@ -276,7 +276,7 @@ impl AutoNull {
         self.samples += 1.0;
     }
 
-    /// Sets the gyro offsets to minus the mean rates; without a sample they stay.
+    /// Sets the gyro offsets to minus the mean rates. Without a sample they stay.
     pub(crate) fn apply(&self, registers: &mut RegisterFile) {
         if self.samples > 0.0 {
             for (address, sum) in (registers::XGYRO_OFF..).step_by(2).zip(self.sum) {

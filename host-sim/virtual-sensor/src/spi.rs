@@ -1,5 +1,5 @@
-//! The SPI port: frames of 16 bits, answers one frame later, burst reads; and the checker of the bus timing. Limits are those
-//! of Table 2 of the data sheet (Rev. B, page 6).
+//! The SPI port: frames of 16 bits, answers one frame later, burst reads, and the checker of the bus timing. Limits are those of Table 2 of
+//! the data sheet (Rev. B, page 6).
 
 use crate::activity::Activity;
 use std::fmt;
@@ -10,7 +10,7 @@ pub const MIN_STALL_NORMAL_NS: u64 = 9_000;
 const MIN_STALL_LOW_POWER_NS: u64 = 75_000;
 /// Least time from one falling edge of chip select to the next in normal mode, ns.
 pub const MIN_READ_RATE_NORMAL_NS: u64 = 40_000;
-/// The same in low-power mode, ns.
+/// Least time from one falling edge of chip select to the next in low-power mode, ns.
 const MIN_READ_RATE_LOW_POWER_NS: u64 = 150_000;
 /// Highest SCK in normal mode, Hz.
 pub const MAX_SCK_NORMAL_HZ: u32 = 2_000_000;
@@ -21,31 +21,31 @@ const MAX_SCK_LOW_POWER_HZ: u32 = 300_000;
 /// Lowest SCK, Hz.
 const MIN_SCK_HZ: u32 = 10_000;
 
-/// Reaction of the part to a controller that does not keep the data sheet.
+/// Reaction of the part to a controller that violates the data sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strictness {
-    /// Every violation is recorded, and none has consequences: data are right at any clock and pause.
+    /// Every violation is recorded without consequences: data are right at any clock and pause.
     Lenient,
-    /// A transaction that comes too soon or is clocked too fast is garbled: the controller reads wrong words until chip select
-    /// rises, no frame is executed, and DIAG_STAT bit 3 is set. Behaviour of drivers that the data sheet neither shows
-    /// nor forbids is accepted, with a [`Note`].
+    /// A transaction that comes too soon or is clocked too fast is garbled: the controller reads wrong words until chip select rises, no
+    /// frame is executed, and DIAG_STAT bit 3 is set. Behaviour of drivers that the data sheet neither shows nor forbids is accepted with a
+    /// [`Note`].
     #[default]
     DataSheet,
-    /// Everything else that gets a note is a violation and has its consequences too; and chip select must be high for a time between two
-    /// frames. The data sheet gives no least time. Drivers that raise chip select between frames keep it high for the
-    /// stall; the ADIS16470 needs 1 µs.
+    /// Everything that would get a note is a violation too, with its consequences. In addition, chip select must be high for a time between
+    /// two frames. The data sheet gives no minimum. Drivers that raise chip select between frames keep it high for the stall; the ADIS16470
+    /// needs 1 µs.
     Pedantic {
         /// Least time of chip select high, ns.
         least_high_ns: u64,
     },
 }
 
-/// Something that the part has accepted although the data sheet does not show it.
+/// Accepted behaviour that the data sheet does not show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Note {
     /// Virtual time, ns.
     pub at_ns: u64,
-    /// Its kind.
+    /// The kind of the behaviour.
     pub kind: NoteKind,
 }
 
@@ -54,16 +54,16 @@ pub struct Note {
 pub enum NoteKind {
     /// Chip select stayed low between two frames; Figure 11 shows it high.
     SelectLow,
-    /// A write of 0 to the upper byte of a register of 8 bits.
+    /// A write of 0 went to the upper byte of a register of 8 bits.
     UnusedByte {
         /// Address of the byte.
         address: u8,
     },
     /// A frame of ones, which some controllers send to receive an answer.
     DummyFrame,
-    /// The write of 0 to the upper byte of GLOB_CMD that follows a command, while the part is busy with it.
+    /// A write of 0 to the upper byte of GLOB_CMD follows a command while the part is busy with it.
     SecondCommandByte,
-    /// SCK above 300 kHz at SMPL_PRD = 0x09, which is normal mode by Tables 1 and 2 and page 13, and low-power mode by Table 7.
+    /// SCK is above 300 kHz at SMPL_PRD = 0x09, which is normal mode by Tables 1 and 2 and page 13, and low-power mode by Table 7.
     FastClockAt0x09 {
         /// The clock, Hz.
         sck_hz: u32,
@@ -85,12 +85,12 @@ impl fmt::Display for Note {
     }
 }
 
-/// The greatest SMPL_PRD of normal mode by Tables 1 and 2 and by page 13. Table 7 has 0x08: see
+/// The greatest SMPL_PRD of normal mode by Tables 1 and 2 and page 13; it is 0x08 in Table 7: see
 /// [`NoteKind::FastClockAt0x09`].
 pub(crate) const NORMAL_MODE_MAX_SMPL_PRD: u16 = 0x09;
 
-/// The answer where the data sheet defines none: after a write, in the first frame of a burst, from a register that cannot
-/// be read.
+/// The answer if the data sheet defines none: after a write, in the first frame of a burst, and from an unreadable
+/// register.
 pub(crate) const UNDEFINED: u16 = 0xA5A5;
 /// The answer on a line that no part drives.
 pub(crate) const FLOATING: u8 = 0xFF;
@@ -107,22 +107,22 @@ pub struct Violation {
 /// The rules that the checker knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ViolationKind {
-    /// Too short a pause between frames.
+    /// The pause between frames is too short.
     Stall {
         /// The pause, ns.
         stall_ns: u64,
         /// The least allowed, ns.
         least_ns: u64,
     },
-    /// Too short a time from one falling edge of chip select to the next.
+    /// The time from one falling edge of chip select to the next is too short.
     ReadRate {
         /// The time, ns.
         interval_ns: u64,
         /// The least allowed, ns.
         least_ns: u64,
     },
-    /// Chip select was high for too short a time between frames, or not at all. Checked by a part that is
-    /// [pedantic](Strictness::Pedantic).
+    /// Chip select was high for too short a time between frames, or not at all. Only a [pedantic](Strictness::Pedantic)
+    /// part checks this.
     SelectHigh {
         /// The time, ns.
         high_ns: u64,
@@ -162,28 +162,28 @@ pub enum ViolationKind {
         /// Whole bytes since chip select fell.
         bytes: usize,
     },
-    /// SCK too fast.
+    /// SCK is too fast.
     Clock {
         /// The clock, Hz.
         sck_hz: u32,
         /// The highest allowed, Hz.
         most_hz: u32,
     },
-    /// SCK too slow.
+    /// SCK is too slow.
     SlowClock {
         /// The clock, Hz.
         sck_hz: u32,
         /// The lowest allowed, Hz.
         least_hz: u32,
     },
-    /// Clocked without chip select.
+    /// The controller clocked without chip select.
     NotSelected,
-    /// A frame during a procedure that needs a silent bus.
+    /// A frame came during a procedure that needs a silent bus.
     Busy {
         /// The procedure.
         activity: Activity,
     },
-    /// A register was read that cannot be read, or a byte written that cannot be written.
+    /// An unreadable register was read, or an unwritable byte written.
     Address {
         /// Address of the byte.
         address: u8,
@@ -242,7 +242,7 @@ impl fmt::Display for Violation {
     }
 }
 
-/// All violations and notes, counted; the first thousand of each are stored.
+/// All violations and notes are counted; the first thousand of each are stored.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BusLog {
     pub(crate) violations: Vec<Violation>,
@@ -276,16 +276,16 @@ pub(crate) struct SpiPort {
     pub(crate) sck_hz: Option<u32>,
     pub(crate) strictness: Strictness,
     selected: bool,
-    /// When chip select fell last, ns.
+    /// Time at which chip select fell last, ns.
     selected_at_ns: u64,
     /// True if chip select has fallen since the part fell asleep.
     may_wake: bool,
-    /// When chip select fell before the latest word, ns.
+    /// Time at which chip select fell before the latest word, ns.
     word_select_at_ns: Option<u64>,
     deselected_at_ns: Option<u64>,
-    /// How long chip select was high before it fell, ns; `None` if it was never low before.
+    /// Time for which chip select was high before it fell, ns; `None` if it was never low before.
     high_ns: Option<u64>,
-    /// A rule was violated since chip select fell.
+    /// True if a rule was violated since chip select fell.
     garbled: bool,
     bytes_since_select: usize,
     /// The first byte of a frame, until the second one comes.
@@ -307,27 +307,27 @@ struct BurstRead {
 
 /// The state in which chip select rose.
 pub(crate) struct Deselected {
-    /// Bytes since chip select fell; `None` if it was high already.
+    /// Bytes since chip select fell; `None` if it was already high.
     pub(crate) bytes: Option<usize>,
-    /// In the middle of a frame.
+    /// True in the middle of a frame.
     pub(crate) in_frame: bool,
-    /// In the middle of a burst read.
+    /// True in the middle of a burst read.
     pub(crate) in_burst: bool,
 }
 
-/// Whether a word begins within the rules of the part.
+/// The begin of a word: within the rules of the part, or garbled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WordStart {
     Sound,
     Garbled,
 }
 
-/// The word that goes out when the part should have sent `word` and was addressed too soon.
+/// The word that is sent instead of `word` if the part is addressed too soon.
 fn garble(word: u16) -> u16 {
     (word ^ UNDEFINED).rotate_left(1)
 }
 
-/// A byte as exchanged.
+/// The result of exchanging a byte.
 pub(crate) struct Shifted {
     pub(crate) answer: u8,
     /// The word from the controller, if the byte completed one.
@@ -359,17 +359,17 @@ impl SpiPort {
         self.selected
     }
 
-    /// The part falls asleep: chip select, which is low, must fall anew to wake it.
+    /// Makes the port wait for a new fall of chip select, which is low, before a pulse can wake the part.
     pub(crate) fn fall_asleep(&mut self) {
         self.may_wake = false;
     }
 
-    /// How long chip select has been low, ns; `None` if it is high, or has been low since the part fell asleep.
+    /// Time for which chip select has been low, ns; `None` if it is high, or has been low since the part fell asleep.
     pub(crate) fn wake_pulse_ns(&self, now_ns: u64) -> Option<u64> {
         (self.selected && self.may_wake).then(|| now_ns - self.selected_at_ns)
     }
 
-    /// True if what gets a note is a violation.
+    /// True if behaviour that would get a note is a violation.
     pub(crate) fn is_pedantic(&self) -> bool {
         matches!(self.strictness, Strictness::Pedantic { .. })
     }
@@ -384,7 +384,7 @@ impl SpiPort {
         self.sck_hz.map_or(0, |sck_hz| 8_000_000_000u64.div_ceil(u64::from(sck_hz)))
     }
 
-    /// Chip select falls.
+    /// Lets chip select fall.
     pub(crate) fn select(&mut self, now_ns: u64) {
         self.selected = true;
         self.selected_at_ns = now_ns;
@@ -395,7 +395,7 @@ impl SpiPort {
         self.upper_byte = None;
     }
 
-    /// Chip select rises; an incomplete frame or burst is dropped.
+    /// Lets chip select rise; an incomplete frame or burst is dropped.
     pub(crate) fn deselect(&mut self, now_ns: u64) -> Deselected {
         self.deselected_at_ns = Some(now_ns);
         Deselected {
@@ -405,7 +405,7 @@ impl SpiPort {
         }
     }
 
-    /// Loads the word that goes out next and checks chip select, pauses and clock before it.
+    /// Loads the next word to be sent, and checks chip select, pauses and clock before it.
     pub(crate) fn begin_word(&mut self, now_ns: u64, smpl_prd: u16, log: &mut BusLog) -> WordStart {
         if !self.garbled {
             let violated = match &self.burst {

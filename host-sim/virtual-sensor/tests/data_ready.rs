@@ -1,4 +1,4 @@
-//! `read_on`: the asynchronous driver at the data-ready line of the virtual part, before, in and after its pulses.
+//! `read_on`: the asynchronous driver at the data-ready line of the virtual part, before, during and after its pulses.
 
 use std::convert::Infallible;
 use std::pin::pin;
@@ -9,7 +9,7 @@ use embedded_hal::digital::{ErrorKind, ErrorType};
 use embedded_hal_async::digital::Wait;
 use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405, VirtualDelay};
 
-/// DIO1 of the part, or a line with a fault. Time goes on while the part is waited for.
+/// DIO1 of the part, or a faulty line. Time advances while the driver waits.
 enum DataReady {
     Sound(EmulatedBus),
     StaysLow,
@@ -72,7 +72,7 @@ fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {
     }
 }
 
-/// A part at 819.2 SPS, whose first sample is due.
+/// A part at 819.2 SPS whose first sample is due.
 fn start() -> (EmulatedBus, Imu) {
     let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::paper(), 3));
     let mut imu = Adis16405::new_async(bus.clone(), bus.delay(), Config::default());
@@ -107,12 +107,12 @@ fn a_pulse_that_has_begun_is_read_at_once() {
     let number = bus.part().samples();
     assert!(read_on(&mut imu, &mut DataReady::Sound(bus.clone())).is_ok());
     assert_eq!(bus.part().samples(), number);
-    // 90 us, 26 bytes at 1 MHz, and 16 us of stall.
+    // The time is 90 µs, 26 bytes at 1 MHz, and 16 µs of stall.
     assert_eq!(bus.part().now(), began_ns + 90_000 + 208_000 + 16_000);
 }
 
-/// A task that is late: its read begins less than a burst's 208 us before the next sample, whose pulse lasts 100 us. The read that
-/// ends within that pulse is followed by one at once.
+/// A task is late: its read begins less than a burst's 208 µs before the next sample, whose pulse lasts 100 µs. The read ends within that
+/// pulse, so another read follows at once.
 #[test]
 fn a_pulse_during_a_read_is_read_by_the_next_call_if_it_is_still_high() {
     for (lead_ns, is_over) in [(150_000, false), (100_000, true)] {

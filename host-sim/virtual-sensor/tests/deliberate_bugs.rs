@@ -1,18 +1,16 @@
-//! Deliberate bugs, seeded into a copy of the driver one at a time: each is found by the driver's tests on the virtual
-//! part. So the tests are known to look, and the part not to share the driver's mistakes.
+//! Deliberate bugs, seeded into a copy of the driver one at a time. The driver's tests on the virtual part must find
+//! each. This shows that the tests can fail, and that the part does not share the driver's errors.
 //!
-//! A bug is one piece of source text that is replaced. One that does not apply any more is an error, also without
-//! `--long`.
+//! A bug replaces one piece of source text. A bug that does not apply any more is an error, also without `--long`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The modules of these tests in which the driver reads the part.
+/// The test modules in which the driver reads the part.
 const TESTS: [&str; 3] = ["driver", "procedures", "misbehaving_part"];
 
-/// A bug in a file of the driver: the text that is there, the one that takes its place, what that means, and a test that
-/// finds it.
+/// A bug in a file of the driver: the original text, its replacement, the meaning, and a test that finds it.
 struct Bug {
     meaning: &'static str,
     file: &'static str,
@@ -105,7 +103,7 @@ const BUGS: [Bug; 34] = [
     bug("the reset line is left low", "fronts.rs",
         "line.set_high().map_err", "line.set_low().map_err",
         "the_reset_line_revives_a_part_that_hears_no_command"),
-    // From the rows of the data sheet.
+    // The following bugs violate rows of the data sheet.
     bug("a frame does not wait for the read rate", "clock.rs",
         "self.read_rate_ns.get(mode).saturating_sub(", "0u32.saturating_sub(",
         "the_driver_keeps_the_read_rate_at_every_clock"),
@@ -117,7 +115,7 @@ const BUGS: [Bug; 34] = [
         "at_0x09_the_driver_takes_the_safe_side"),
     bug("the wake-up pulse is 10 µs", "clock.rs",
         "wake_pulse_ns: 25_000,", "wake_pulse_ns: 10_000,",
-        "sleep_and_wake"),
+        "a_sleep_lasts_as_long_as_requested_or_until_the_part_is_woken"),
     bug("the precision auto-null is given 30 s, without its flash update", "clock.rs",
         "precision_auto_null_us: 31_000_000,", "precision_auto_null_us: 30_000_000,",
         "the_precision_auto_null_averages_for_thirty_silent_seconds"),
@@ -151,7 +149,7 @@ fn write(path: &Path, text: &str) {
     fs::write(path, text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
 }
 
-/// Copies the files of a folder, and those of the folders in it.
+/// Copies a folder with its subfolders.
 fn copy(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).unwrap_or_else(|error| panic!("{}: {error}", from.display())) {
         let path = entry.expect("an entry").path();
@@ -180,7 +178,7 @@ fn every_bug_applies_and_is_in_the_docs() {
     system_tests::generated("docs/driver.md", "deliberate-bugs", &format!("{} bugs", BUGS.len()));
 }
 
-/// A workspace of the driver and the virtual part alone, in the target folder.
+/// A workspace of only the driver and the virtual part, in the target folder.
 struct Copy {
     root: PathBuf,
 }
@@ -208,7 +206,7 @@ impl Copy {
         {
             write(&root.join(file), &read(&from.join(file)));
         }
-        // This module does not run there; what it alone uses is not in this workspace.
+        // This module does not run there, and its own dependencies are not in that workspace.
         for (file, line) in [("Cargo.toml", "system-tests = "), ("tests/suite.rs", "mod deliberate_bugs;")] {
             let path = root.join("host-sim/virtual-sensor").join(file);
             let text = read(&path);
@@ -222,7 +220,7 @@ impl Copy {
         self.root.join("adis16405-driver/src").join(bug.file)
     }
 
-    /// Runs the driver's tests on the virtual part; the names of those that fail.
+    /// Runs the driver's tests on the virtual part; returns the names of those that fail.
     fn failures(&self) -> Vec<String> {
         let output = Command::new(env!("CARGO"))
             .current_dir(&self.root)

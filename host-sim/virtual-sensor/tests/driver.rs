@@ -1,4 +1,4 @@
-//! The real driver reads the virtual part: configuration, samples, timing and violations. Numbers are those of the data sheet.
+//! The real driver reads the virtual part: configuration, samples, timing and violations. Numbers are from the data sheet.
 
 use adis16405_driver::{
     Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, PerClockMode, Register, SamplePeriod, Timing,
@@ -46,8 +46,8 @@ fn low_power_mode_needs_a_slow_clock() {
     assert!(bus.part().violations().iter().any(|violation| violation.kind == clock));
 }
 
-/// Data sheet Rev. B, Table 2: from one falling edge of chip select to the next at least 40 µs in normal mode and 150 µs in low-power
-/// mode, at every clock that the mode allows.
+/// Data sheet Rev. B, Table 2: the time from one falling edge of chip select to the next is at least 40 µs in normal mode and 150 µs in
+/// low-power mode. The driver keeps it at every clock that the mode allows.
 #[test]
 fn the_driver_keeps_the_read_rate_at_every_clock() {
     for (smpl_prd, clocks_hz) in
@@ -73,7 +73,7 @@ fn the_driver_keeps_the_read_rate_at_every_clock() {
     }
 }
 
-/// At SMPL_PRD = 0x09, where the data sheet contradicts itself, the driver names the slow clock (Table 7).
+/// The data sheet contradicts itself at SMPL_PRD = 0x09. The driver requires the slow clock (Table 7).
 #[test]
 fn at_0x09_the_driver_takes_the_safe_side() {
     let config = config(GyroRange::Dps300, 2, 0x09);
@@ -86,7 +86,7 @@ fn at_0x09_the_driver_takes_the_safe_side() {
     assert_eq!((bus.part().violations(), bus.part().notes()), (&[][..], &[][..]));
 }
 
-/// The driver needs no tolerance.
+/// The driver passes without any tolerance.
 #[test]
 fn a_pedantic_part_has_nothing_to_note() {
     let mut part = VirtualAdis16405::new(NoiseModel::paper(), 1);
@@ -100,9 +100,9 @@ fn a_pedantic_part_has_nothing_to_note() {
     assert_eq!((bus.part().violations(), bus.part().notes()), (&[][..], &[][..]));
 }
 
-/// The outputs after the positive stimulus is switched on, 40 °/s in the gyros: the sum of the weights of the samples that the
-/// filter has taken since, which are the triangle of two averages over 8 samples. And after an internal self-test, which applies the same, the filter
-/// still mixes its samples.
+/// The positive stimulus, 40 °/s in the gyros, is switched on. The outputs then follow the sum of the filter's weights of the samples
+/// since, the triangle of two averages over 8 samples. An internal self-test applies the same stimulus, and the filter contains its samples
+/// afterwards.
 #[test]
 fn a_step_passes_the_filter_with_a_triangle_of_weights() {
     let config = config(GyroRange::Dps300, 3, 1);
@@ -151,7 +151,7 @@ fn the_driver_reads_what_the_part_sampled() {
 
 #[test]
 fn samples_come_at_the_programmed_instants() {
-    // SMPL_PRD is not written (reset value 1), so sample k is at k·2/1638.4 s = k·1220703.125 ns.
+    // SMPL_PRD keeps its reset value 1, so sample k is at k·2/1638.4 s = k·1220703.125 ns.
     let (bus, _) = on_bus(NoiseModel::noiseless(), config(GyroRange::Dps300, 2, 1));
     let taken = bus.part().samples();
     for k in taken + 1..=100_000 {
@@ -189,7 +189,7 @@ fn the_new_data_flag_shows_once() {
     assert!(burst.words[Channel::AuxAdc as usize].new_data());
 }
 
-/// No source tells at which rate the part refreshes its supply, magnetometer, temperature and auxiliary words.
+/// No source gives the rate at which the part refreshes its supply, magnetometer, temperature and auxiliary words.
 #[test]
 fn samples_are_usable_although_the_slow_words_refresh_slowly() {
     let (bus, mut imu) = on_bus(NoiseModel::paper(), config(GyroRange::Dps300, 0, 7));
@@ -203,7 +203,7 @@ fn samples_are_usable_although_the_slow_words_refresh_slowly() {
         assert!(validity.is_usable() && Faults::REPEATED.contains(validity.faults), "{:?}", validity.faults);
         assert_eq!(burst.counts(), Counts::new(*bus.part().counts()));
         new_supplies += u32::from(burst.words[Channel::Supply as usize].new_data());
-        // Read twice within a sample, the inertial words are not new.
+        // If the inertial words are read twice within a sample, they are not new.
         assert_eq!(imu.burst().unwrap().faults(), Faults::NO_NEW_DATA);
     }
     assert_eq!(new_supplies, 500);
@@ -310,7 +310,7 @@ fn violations_of_the_bus_timing_are_recorded() {
 #[test]
 fn a_sample_with_an_invalid_range_and_filter_is_a_violation() {
     let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);
-    // The range raises the taps to the least that it allows (page 14); a filter that is written after it does not.
+    // The range raises the taps to its minimum (page 14); a filter that is written later does not.
     for (word, sens_avg) in [(0xB901, 0x0104), (0xB802, 0x0102)] {
         part.advance_to(part.now() + 40_000);
         part.select();
@@ -329,7 +329,7 @@ fn the_range_scales_the_gyros_only() {
     for (range, expected) in [(GyroRange::Dps300, -250), (GyroRange::Dps150, -500), (GyroRange::Dps75, -1000)] {
         let (bus, mut imu) = on_bus(model.clone(), config(range, 4, 1));
         bus.wait_for_data();
-        // 5 V, 36 °C and 0.5 V in counts of 2.418 mV, 0.14 °C from 25 °C, and 0.806 mV.
+        // The values are 5 V, 36 °C and 0.5 V in counts of 2.418 mV, 0.14 °C from 25 °C, and 0.806 mV.
         let still = [2068, 0, 0, expected, 0, 0, -300, 400, 0, 860, 79, 620];
         assert_eq!(imu.burst().unwrap().counts(), Counts::new(still));
     }
@@ -351,9 +351,10 @@ fn white_noise_has_the_declared_variance() {
                 *sum += f64::from(count).powi(2);
             }
         }
-        // N·√fs in counts; two averages of four weigh 1 2 3 4 3 2 1 of 16; rounding adds a twelfth of a count squared.
+        // The variance is (N·√fs)² in counts². Two averages of four weigh 1 2 3 4 3 2 1 of 16, and rounding adds a
+        // twelfth of a count squared.
         let expected = shrink * (0.0368 / 0.05f64).powi(2) * 204.8 + 1.0 / 12.0;
-        // The variance of n independent values is known to √(2/n); seven neighbours are correlated at most.
+        // The variance of n independent values is known to √(2/n). At most seven neighbours are correlated.
         let tolerance = 5.0 * (2.0 * if taps == 0 { 1.0 } else { 7.0 } / f64::from(SAMPLES)).sqrt();
         for square in squares {
             let variance = square / f64::from(SAMPLES);
@@ -362,10 +363,10 @@ fn white_noise_has_the_declared_variance() {
     }
 }
 
-/// Each sensed value, in its unit, comes back in that unit to half a count, both as an integer and as `f32`.
+/// Each sensed value is returned in its unit to half a count, both as an integer and as `f32`.
 #[test]
 fn values_are_those_that_the_part_senses() {
-    // Supply, gyros, accelerometers, magnetometers, temperature, auxiliary input.
+    // The order is supply, gyros, accelerometers, magnetometers, temperature, auxiliary input.
     let sensed = [5.1, 60.0, -33.3, 0.7, 10.0, -7.5, 3.0, 0.9, -1.2, 0.3, -39.9, 1.23];
     let mut model = NoiseModel::noiseless();
     for (channel, value) in OutputRegister::ALL.into_iter().zip(sensed) {
@@ -374,7 +375,7 @@ fn values_are_those_that_the_part_senses() {
     let counts = [2.418e-3, 0.0, 0.0, 0.0, 3.33e-3, 3.33e-3, 3.33e-3, 5e-4, 5e-4, 5e-4, 0.14, 0.806e-3];
     for (range, gyro_count) in [(GyroRange::Dps300, 0.05), (GyroRange::Dps150, 0.025), (GyroRange::Dps75, 0.0125)] {
         let (bus, mut imu) = on_bus(model.clone(), config(range, 4, 1));
-        // The filter of 2·16 − 1 samples fills.
+        // These samples fill the filter of 2·16 − 1 samples.
         for _ in 0..40 {
             bus.wait_for_data();
         }
@@ -400,8 +401,9 @@ fn values_are_those_that_the_part_senses() {
     }
 }
 
-/// From ±75 °/s, which needs 2⁴ taps, to ±300 °/s without a filter and back, at every phase of the sample clock: whichever
-/// byte of SENS_AVG is written when a sample is taken, range and filter must be a combination that the part allows.
+/// The range changes from ±75 °/s, which needs 2⁴ taps, to ±300 °/s without a filter and back, at every phase of the
+/// sample clock. Whichever byte of SENS_AVG is written when a sample is taken, range and filter must be a valid
+/// combination.
 #[test]
 fn no_sample_is_taken_between_range_and_filter_of_a_new_configuration() {
     let (narrow, wide) = (config(GyroRange::Dps75, 4, 1), config(GyroRange::Dps300, 0, 1));
@@ -420,7 +422,7 @@ fn no_sample_is_taken_between_range_and_filter_of_a_new_configuration() {
     assert_eq!(bus.part().violations(), []);
 }
 
-/// Data sheet Rev. B, Table 9: SUPPLY_OUT has 14 bits of 2.418 mV. 4500 counts, 10.881 V, are more than 12 bits hold.
+/// Data sheet Rev. B, Table 9: SUPPLY_OUT has 14 bits of 2.418 mV. 4500 counts, 10.881 V, do not fit 12 bits.
 #[test]
 fn the_supply_has_14_bits() {
     let mut model = NoiseModel::noiseless();

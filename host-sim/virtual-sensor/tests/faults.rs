@@ -1,5 +1,5 @@
-//! The part when it is cold, latched, strict about its bus, or reset by its pin: words on the bus, without the
-//! driver. Times and bits are those of the data sheet.
+//! The part when it is cold, latched, strict about its bus, or reset by its pin, by words on the bus without the
+//! driver. Times and bits are from the data sheet.
 
 use virtual_sensor::{
     Activity, BusyAnswers, DiagnosisFlag, EmulatedBus, NoiseModel, Strictness, Violation, ViolationKind,
@@ -71,13 +71,14 @@ fn a_write_to_a_cold_part_is_lost() {
     assert_eq!(read(&mut part, 0x36), 0x0001);
 }
 
-/// Table 1 gives 12 ms at SMPL_PRD = 0x01; taken as so many samples that is 48 ms at 0x07, of four times the period.
+/// Table 1 gives 12 ms at SMPL_PRD = 0x01. For the same number of samples this is 48 ms at 0x07, where the period is
+/// four times as long.
 #[test]
 fn the_self_test_takes_as_many_samples_at_a_slower_rate() {
     for (smpl_prd, hold_ms) in [(0x01, 12), (0x07, 48)] {
         let mut part = part();
         frame_after(&mut part, 40_000, 0xB600 | smpl_prd);
-        // MSC_CTRL, bit 10, which clears at the end of the test.
+        // Bit 10 of MSC_CTRL clears at the end of the test.
         frame_after(&mut part, 40_000, 0xB504);
         let begun = part.now();
         part.advance_to(begun + (hold_ms - 1) * MS);
@@ -90,7 +91,7 @@ fn the_self_test_takes_as_many_samples_at_a_slower_rate() {
 #[test]
 fn a_start_up_takes_longer_in_low_power_mode_or_as_long_as_is_set() {
     let mut part = part();
-    // SMPL_PRD = 0x0F is stored in flash.
+    // SMPL_PRD = 0x0F is written, then stored in flash.
     frame_after(&mut part, 40_000, 0xB60F);
     frame_after(&mut part, 150_000, 0xBE08);
     part.advance_to(part.now() + 50 * MS);
@@ -111,7 +112,7 @@ fn a_start_up_takes_longer_in_low_power_mode_or_as_long_as_is_set() {
 
 #[test]
 fn every_flag_latches_alone_and_shows_in_the_burst_until_it_is_read() {
-    // Those of the supply return to 0 without a read (page 15).
+    // The flags of the supply return to 0 without a read (page 15).
     for flag in DiagnosisFlag::ALL.into_iter().skip(2) {
         let mut part = part();
         part.advance_to(part.next_data_ready());
@@ -124,7 +125,7 @@ fn every_flag_latches_alone_and_shows_in_the_burst_until_it_is_read() {
         assert!(burst(&mut part).iter().all(|word| word & 0x4000 == 0), "{flag:?}");
         assert_eq!(read(&mut part, 0x3C), 0);
     }
-    // All bits but the unused one, 7.
+    // All bits are flags except bit 7.
     assert_eq!(DiagnosisFlag::ALL.iter().fold(0, |all, flag| all | flag.bit()), 0xFF7F);
 }
 
@@ -151,7 +152,7 @@ fn pedantic(least_high_ns: u64) -> VirtualAdis16405 {
 
 #[test]
 fn a_pedantic_part_needs_chip_select_high_between_frames() {
-    // By default chip select may rise and fall at once; stall and read rate are kept.
+    // By default chip select may rise and fall at once; only stall and read rate are checked.
     let mut tolerant = part();
     let mut pedantic = pedantic(1_000);
     for part in [&mut tolerant, &mut pedantic] {
@@ -172,7 +173,7 @@ fn a_pedantic_part_needs_chip_select_high_between_frames() {
     let kind = ViolationKind::SelectHigh { high_ns: 999, least_ns: 1_000 };
     assert_eq!(pedantic.violations(), [Violation { at_ns: 40_999, kind }]);
     assert!(pedantic.violations()[0].to_string().contains("999 ns"));
-    // The write did not happen, and the flag of the SPI port latched.
+    // The write did not happen, and the flag of the SPI port is latched.
     assert_eq!(read(&mut pedantic, 0x36), 0x0001);
     assert_eq!(read(&mut pedantic, 0x3C), 0x0008);
     assert_eq!(read(&mut pedantic, 0x3C), 0x0000);
@@ -232,7 +233,7 @@ fn the_reset_line_resets_after_10_us() {
 fn the_first_sample_after_a_reset_refreshes_the_slow_words_too() {
     let mut part = part();
     part.set_slow_refresh(4);
-    // Two samples, so that the next one is not the fourth.
+    // After two samples the next one is not the fourth.
     for _ in 0..2 {
         part.advance_to(part.next_data_ready());
     }
@@ -261,7 +262,7 @@ fn chip_select_wakes_the_part_after_20_us() {
     for (words, low_ns, wakes) in [(0, 19_999, false), (0, 20_000, true), (1, 19_999, false), (1, 20_000, true)] {
         let mut part = part();
         part.set_sck_hz(Some(2_000_000));
-        // SLP_CNT = 0x0100.
+        // This writes SLP_CNT = 0x0100.
         frame_after(&mut part, 40_000, 0xBB01);
         part.advance_to(part.now() + 1000 * MS);
         part.select();
@@ -278,7 +279,8 @@ fn chip_select_wakes_the_part_after_20_us() {
     }
 }
 
-/// Table 2 and Figure 3: at least 40 µs from one falling edge of chip select to the next in normal mode, 150 µs in low-power mode.
+/// Table 2 and Figure 3: the time from one falling edge of chip select to the next is at least 40 µs in normal mode, 150 µs in low-power
+/// mode.
 #[test]
 fn a_frame_that_comes_too_soon_is_garbled_unless_the_part_is_lenient() {
     for (smpl_prd, least_ns) in [(0x09, 40_000u64), (0x0A, 150_000)] {
@@ -290,7 +292,7 @@ fn a_frame_that_comes_too_soon_is_garbled_unless_the_part_is_lenient() {
             frame_after(&mut part, 200_000, 0x5600);
             assert_eq!(frame_after(&mut part, 200_000, 0x0000), 0x4015);
             assert_eq!(part.violations(), []);
-            // 16 periods of 300 kHz are 53.334 µs as the bus counts them.
+            // The bus rounds 16 periods of 300 kHz up to 53.334 µs.
             let pause_ns = least_ns.saturating_sub(53_336).max(if smpl_prd == 0x09 { 8_998 } else { 0 });
             frame_after(&mut part, 200_000, 0x5600);
             let answer = frame_after(&mut part, pause_ns, 0xB607);
@@ -317,7 +319,7 @@ fn read_slowly(part: &mut VirtualAdis16405, address: u8) -> u16 {
     frame_after(part, 200_000, 0x0000)
 }
 
-/// Table 2: SCK from 10 kHz to 2 MHz, in a burst to 1 MHz.
+/// Table 2: SCK is 10 kHz to 2 MHz, and at most 1 MHz in a burst.
 #[test]
 fn a_clock_beyond_its_limits_garbles() {
     for (sck_hz, frame_is_right, burst_is_right) in [
@@ -338,8 +340,8 @@ fn a_clock_beyond_its_limits_garbles() {
     }
 }
 
-/// Page 13: auto-null, precision auto-null and factory restore set the outputs to 0 and write the flash by themselves, within 50 ms;
-/// the second after 30 s offline. Page 10: a flash update takes 50 ms and needs the supply in its window.
+/// Page 13: auto-null, precision auto-null and factory restore set the outputs to 0 and write the flash within 50 ms, the second after 30 s
+/// offline. Page 10: a flash update takes 50 ms and needs the supply in its window.
 #[test]
 fn the_calibration_commands_write_the_flash() {
     for (command, duration_ms) in [(0x01, 50), (0x02, 50), (0x08, 50), (0x10, 30_050)] {
@@ -349,7 +351,7 @@ fn the_calibration_commands_write_the_flash() {
             model.channel_mut(virtual_sensor::OutputRegister::GyroX).bias = 0.5;
             let mut part = VirtualAdis16405::new(model, 1);
             part.advance_to(100 * MS);
-            // YACCL_OFF = 5, ZMAGN_SIF = 0x0700.
+            // These frames set YACCL_OFF = 5 and ZMAGN_SIF = 0x0700.
             frame_after(&mut part, 40_000, 0xA205);
             frame_after(&mut part, 40_000, 0xB107);
             frame_after(&mut part, 40_000, 0xBE00 | command);
@@ -376,12 +378,12 @@ fn the_calibration_commands_write_the_flash() {
     }
 }
 
-/// Table 26: ALM_SMPL = 0x00 and 0x01 both compare with the sample before.
+/// Table 26: ALM_SMPL = 0x00 and 0x01 both compare with the previous sample.
 #[test]
 fn a_rate_of_change_over_0_samples_is_that_over_1() {
     for samples in [0u16, 1] {
         let mut part = part();
-        // ALM_CTRL: alarm 1 on gyro y, rate of change, unfiltered; above 99 counts.
+        // Alarm 1 watches the rate of change of gyro y, unfiltered, above 99 counts.
         for word in [0xC903, 0xC840, 0xC400 | samples, 0xC063, 0xC180] {
             frame_after(&mut part, 40_000, word);
         }
@@ -389,7 +391,7 @@ fn a_rate_of_change_over_0_samples_is_that_over_1() {
             part.advance_to(part.next_data_ready());
         }
         assert_eq!(read(&mut part, 0x3C), 0);
-        // YGYRO_OFF = 400: a step of 100 counts.
+        // YGYRO_OFF = 400 makes a step of 100 counts.
         frame_after(&mut part, 40_000, 0x9C90);
         frame_after(&mut part, 40_000, 0x9D01);
         part.advance_to(part.next_data_ready());
@@ -399,7 +401,8 @@ fn a_rate_of_change_over_0_samples_is_that_over_1() {
     }
 }
 
-/// Table 2 and Figure 4: pulses of at least 5 µs, at least 833 µs apart, 600 µs before data ready; page 14: DIO4 is an input.
+/// Table 2 and Figure 4: pulses last at least 5 µs, are at least 833 µs apart, and come 600 µs before data ready. Page 14: DIO4 is an
+/// input.
 #[test]
 fn the_external_clock_has_the_times_of_table_2() {
     let mut part = part();

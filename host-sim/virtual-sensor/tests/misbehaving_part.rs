@@ -1,5 +1,5 @@
-//! The driver on a part as a bench may present it: cold, strict about chip select, with a flag of DIAG_STAT latched, or so
-//! far gone that only its reset line helps.
+//! The driver on a misbehaving part: cold, strict about chip select, with a latched flag of DIAG_STAT, or responsive
+//! only to its reset line.
 
 use std::cell::Cell;
 use std::convert::Infallible;
@@ -23,7 +23,7 @@ fn driver(bus: &EmulatedBus) -> Adis16405<EmulatedBus, VirtualDelay> {
     Adis16405::new(bus.clone(), bus.delay(), Config::default())
 }
 
-/// A driver with other times than the default ones.
+/// A driver with times that `change` has modified.
 fn timed_driver(bus: &EmulatedBus, change: impl FnOnce(&mut Timing)) -> Adis16405<EmulatedBus, VirtualDelay> {
     let mut timing = Timing::DEFAULT;
     change(&mut timing);
@@ -48,7 +48,7 @@ fn the_default_keeps_chip_select_high_for_the_whole_stall() {
     }
     assert_eq!(bus.part().violations(), []);
 
-    // The shortest that the part accepts: 9 µs after a burst, and at 1 MHz 24 µs after a frame, of which one comes every 40 µs.
+    // The shortest times that the part accepts are 9 µs after a burst and, at 1 MHz, 24 µs after a frame, of which one comes every 40 µs.
     let bus = strict(9_000);
     let mut imu = timed_driver(&bus, |timing| {
         timing.stall_ns.normal = 9_000;
@@ -60,7 +60,7 @@ fn the_default_keeps_chip_select_high_for_the_whole_stall() {
     assert_eq!(bus.part().violations(), []);
 }
 
-/// With chip select low during the stall, it is high only between two transactions: for as long as is set, or not at all.
+/// If chip select is low during the stall, it is high only between two transactions: for the set time, or not at all.
 #[test]
 fn with_chip_select_low_during_the_stall_its_high_time_is_what_is_set() {
     for (select_high_ns, least_high_ns, sound) in [(1_000, 1_000, true), (999, 1_000, false), (0, 1, false)] {
@@ -87,7 +87,7 @@ fn a_pause_after_a_frame_is_at_least_the_least_time_of_chip_select_high() {
     assert_eq!(bus.part().violations(), []);
 }
 
-/// A delay that does not end when it is asked for the nth time.
+/// A delay that does not end at its nth call.
 struct HangingDelay {
     delay: VirtualDelay,
     left: Rc<Cell<Option<usize>>>,
@@ -106,7 +106,7 @@ impl DelayNs for HangingDelay {
     }
 }
 
-/// Polls a future once and drops it; its value if it was ready.
+/// Polls a future once and drops it; returns its value if it was ready.
 fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(output) => Some(output),
@@ -156,7 +156,7 @@ fn a_cold_part_is_left_alone_until_it_has_started_up() {
 
 #[test]
 fn each_latched_flag_is_a_warning_until_its_diagnosis_is_read() {
-    // Those of the supply clear by themselves.
+    // The flags of the supply clear by themselves.
     for flag in DiagnosisFlag::ALL.into_iter().skip(2) {
         let bus = strict(1_000);
         let mut imu = driver(&bus);
@@ -174,7 +174,8 @@ fn each_latched_flag_is_a_warning_until_its_diagnosis_is_read() {
     }
 }
 
-/// A sensor sets the error flag in all words of a burst or in none: in one word alone it is a bit that the bus has inverted.
+/// A sensor sets the error flag in all words of a burst or in none. In a single word it is a bit that the bus has
+/// inverted.
 #[test]
 fn an_error_flag_in_one_word_alone_refuses_the_burst() {
     let bus = strict(1_000);
@@ -191,7 +192,7 @@ fn an_error_flag_in_one_word_alone_refuses_the_burst() {
     }
 }
 
-/// A part at 4.70 V, as from a USB port, goes on measuring.
+/// A part at 4.70 V, as from a USB port, continues to measure.
 #[test]
 fn a_supply_outside_its_window_refuses_a_sample_only_if_that_is_asked_for() {
     for (volts, is_asked_for) in [(4.7, false), (5.3, false), (4.7, true)] {
@@ -251,7 +252,7 @@ fn the_reset_line_revives_a_part_that_hears_no_command() {
     imu.sleep(Sleep::Indefinite).unwrap();
     let before = bus.part().now();
     assert_eq!(imu.hardware_reset(&mut line), Ok(Product::Adis16405));
-    // 100 µs low, 170 ms to recover, some frames.
+    // The reset takes 100 µs low, 170 ms of recovery, and some frames.
     let took_ns = bus.part().now() - before;
     assert!((170_100_000..172_000_000).contains(&took_ns), "{took_ns} ns");
     assert!(imu.is_ready());
@@ -283,7 +284,7 @@ fn a_reset_that_fails_leaves_the_driver_not_ready() {
         bus.wait_for_data();
         assert!(imu.read().is_ok());
     }
-    // A pulse that is too short for the part.
+    // The pulse is too short for the part.
     let bus = strict(1_000);
     let mut imu = timed_driver(&bus, |timing| timing.reset_pulse_us = 9);
     imu.start_up().unwrap();

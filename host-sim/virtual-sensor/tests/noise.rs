@@ -1,18 +1,19 @@
-//! The noise source against the Allan variance of each coefficient, and the digital filter against its impulse response.
+//! The noise source against the Allan variance of each coefficient, and the digital filter against its impulse
+//! response.
 
 use virtual_sensor::{CascadedBoxFilter, NoiseModel, NoiseSource, OutputRegister};
 
 const SAMPLES: usize = 1 << 14;
 const SEEDS: u64 = 60;
 
-/// Allan variance at averaging factor `n`, sample period 1 s, by its definition (IEEE Std 952), no overlap.
+/// Allan variance at averaging factor `n` by its definition (IEEE Std 952), sample period 1 s, no overlap.
 fn allan_variance(values: &[f64], n: usize) -> f64 {
     let means: Vec<f64> = values.chunks_exact(n).map(|chunk| chunk.iter().sum::<f64>() / n as f64).collect();
     let differences = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
     differences.sum::<f64>() / (2.0 * (means.len() - 1) as f64)
 }
 
-/// Mean over the seeds, and its standard error.
+/// The mean over the seeds, and its standard error.
 fn mean_allan_variance(model: &NoiseModel, n: usize) -> (f64, f64) {
     let variances: Vec<f64> = (0..SEEDS)
         .map(|seed| {
@@ -46,7 +47,7 @@ fn each_coefficient_gives_its_allan_variance() {
     let mut model = NoiseModel::noiseless();
     model.channel_mut(OutputRegister::GyroX).rate_random_walk = 0.5;
     for n in [1, 16, 128] {
-        // K²τ/3 for a continuous walk; sampled at n points a factor 1 + 1/(2n²).
+        // A continuous walk has K²τ/3; sampling at n points gives a factor 1 + 1/(2n²).
         let tau = n as f64;
         check(&model, n, 0.25 * tau / 3.0 * (1.0 + 0.5 / (tau * tau)), 0.0);
     }
@@ -54,8 +55,8 @@ fn each_coefficient_gives_its_allan_variance() {
     let mut model = NoiseModel::noiseless();
     model.channel_mut(OutputRegister::GyroX).bias_instability = 3.0;
     for n in [32, 256] {
-        // Processes an octave apart ripple by less than 1 %; those shorter than the sample period are missing, as
-        // is aliasing: about 1/n each.
+        // Processes an octave apart ripple by less than 1 %. Processes shorter than the sample period, and aliasing,
+        // are missing: about 1/n each.
         let expected = 9.0 * 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI;
         check(&model, n, expected, 0.01 + 2.0 / n as f64);
     }
@@ -80,7 +81,8 @@ fn the_impulse_response_of_the_filter_is_a_triangle() {
     let mut filter = CascadedBoxFilter::new(2);
     filter.filter(0.0);
     let response: Vec<f64> = (0..10).map(|k| 16.0 * filter.filter(if k == 0 { 1.0 } else { 0.0 })).collect();
-    // 2N + 1 taps with a phase of N samples (data sheet Rev. B, Figure 15), N = 4; a Bartlett window begins and ends with 0.
+    // The filter has 2N + 1 taps with a phase of N samples (data sheet Rev. B, Figure 15), N = 4; a Bartlett window
+    // begins and ends with 0.
     assert_eq!(response, [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0, 0.0]);
 }
 

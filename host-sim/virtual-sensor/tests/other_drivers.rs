@@ -1,8 +1,8 @@
-//! Words of drivers that others wrote, and the answers of the part. The drivers work on real parts, so that what they
-//! decode is the truth of the part; and where they break a rule of the data sheet (Rev. B), they fail as on a real one.
+//! Words that drivers of other authors send, and the answers of the part. These drivers work on real parts, so their
+//! decoding is right. If they violate the data sheet (Rev. B), they fail as on a real part.
 //!
-//! Each row of a table is a transaction: its source, its words, the pause after each of them with chip select low, and the pause
-//! after it with chip select high. The sources are public repositories:
+//! Each row is a transaction: its source, its words, the pause after each word with chip select low, and the pause after the transaction
+//! with chip select high. The sources are public repositories:
 //!
 //! | driver | repository, commit | files |
 //! |---|---|---|
@@ -18,13 +18,13 @@ const MS: u64 = 1_000_000;
 struct Row<'a> {
     source: &'a str,
     words: &'a [u16],
-    /// After each word, with chip select low, ns.
+    /// Pause after each word, with chip select low, ns.
     low_ns: u64,
-    /// After the transaction, with chip select high, ns.
+    /// Pause after the transaction, with chip select high, ns.
     high_ns: u64,
 }
 
-/// Carries the transactions out at `sck_hz`; the words received.
+/// Runs the transactions at `sck_hz`; returns the words received.
 fn run(part: &mut VirtualAdis16405, sck_hz: u32, rows: &[Row<'_>]) -> Vec<u16> {
     part.set_sck_hz(Some(sck_hz));
     let mut answers = Vec::new();
@@ -53,8 +53,8 @@ fn notes(part: &VirtualAdis16405) -> Vec<NoteKind> {
     part.notes().iter().map(|note| note.kind).collect()
 }
 
-/// A part that senses a different value in every channel: supply, gyros, accelerometers, magnetometers, temperature, auxiliary
-/// input; and its counts by Table 9 of the data sheet (2.418 mV, 0.05 °/s, 3.33 mg, 0.5 mgauss, 0.14 °C from 25 °C, 806 µV).
+/// A part that senses a different value in every channel, and its counts by Table 9 of the data sheet (2.418 mV, 0.05 °/s, 3.33 mg, 0.5
+/// mgauss, 0.14 °C from 25 °C, 806 µV).
 fn sensing() -> (VirtualAdis16405, [i32; 12]) {
     let sensed = [5.0, 60.0, -60.3, 0.7, 1.0, -7.5, 3.0, 0.9, -1.2, 0.3, -39.9, 1.0];
     let counts = [2068, 1200, -1206, 14, 300, -2252, 901, 1800, -2400, 600, -464, 1241];
@@ -72,8 +72,8 @@ fn sign_extended(word: u16, bits: u32) -> i32 {
     i32::from(word) << (32 - bits) >> (32 - bits)
 }
 
-/// As the three drivers decode an output: of Linux `adis16400_channels`, of PSAS `buffer_to_burst_data` (`ADIS16405.c:133`), of
-/// Canopus `RAW2LSB14`.
+/// The outputs as the drivers decode them: Linux by `adis16400_channels`, PSAS by `buffer_to_burst_data` (`ADIS16405.c:133`), Canopus by
+/// `RAW2LSB14`.
 fn decoded(words: &[u16]) -> Vec<i32> {
     let bits = [14, 14, 14, 14, 14, 14, 14, 14, 14, 14, 12, 12];
     let output = |(index, word): (usize, &u16)| match index {
@@ -96,8 +96,8 @@ mod linux {
     const CS_CHANGE_NS: u64 = 10_000;
     /// Least time of the SPI core from one message to the next.
     const MESSAGE_NS: u64 = 30_000;
-    /// Time that the SPI core and its controller take around each transfer in low-power mode. The sums of the delays alone, 60 µs of
-    /// stall and 113 µs from frame to frame, would break the 75 µs and 150 µs of Table 2.
+    /// Time of the SPI core and its controller around each transfer in low-power mode. Without it the delays, 60 µs of stall and 113 µs
+    /// from frame to frame, would violate the 75 µs and 150 µs of Table 2.
     const SLOW_OVERHEAD_NS: u64 = 40_000;
 
     const fn row<'a>(source: &'a str, words: &'a [u16], high_ns: u64) -> Row<'a> {
@@ -133,8 +133,8 @@ mod linux {
         run(part, sck_hz, &rows);
     }
 
-    /// `adis16400_probe`: `adis_init` at the clock of the device tree, `adis16400_initial_setup` at the slow one. Returns the
-    /// status after the self-test, and PROD_ID.
+    /// `adis16400_probe`: `adis_init` at the clock of the device tree, `adis16400_initial_setup` at the slow one. Returns the status after
+    /// the self-test, and PROD_ID.
     fn probe(part: &mut VirtualAdis16405) -> (u16, u16) {
         // adis_enable_irq(false): data ready off, active high, DIO1.
         let control = read(part, FAST_HZ, 0x34);
@@ -149,7 +149,7 @@ mod linux {
     }
 
     fn set_rate(part: &mut VirtualAdis16405, millihertz: u32) -> u32 {
-        // adis16400_set_freq: the word, and the clock that is set before it is sent.
+        // adis16400_set_freq sets the clock before it sends the word.
         let mut divisor = 1_638_404 / millihertz;
         let mut base = 0;
         if divisor >= 128 {
@@ -163,22 +163,22 @@ mod linux {
     }
 
     #[test]
-    fn probe_reset_and_all_channels() {
+    fn probe_and_reset_succeed_and_all_channels_read_as_sensed() {
         let (mut part, counts) = sensing();
         assert_eq!(probe(&mut part), (0x0000, 0x4015));
         // adis_reset, sw_reset_ms = 170.
         write_8(&mut part, FAST_HZ, 0x3E, 0x80);
         wait(&mut part, 170 * MS);
-        // adis16400_read_raw of the twelve channels, each a message of two frames.
+        // adis16400_read_raw reads each of the twelve channels in a message of two frames.
         wait(&mut part, 50 * MS);
         let words: Vec<u16> = (0x02..=0x18).step_by(2).map(|address| read(&mut part, FAST_HZ, address)).collect();
         assert_eq!(decoded(&words), counts);
         assert_eq!((violations(&part), notes(&part)), (vec![], vec![]));
     }
 
-    /// `adis16400_trigger_handler`: two transfers in one message, at the clock for bursts.
+    /// `adis16400_trigger_handler` sends two transfers in one message, at the clock for bursts.
     #[test]
-    fn a_burst() {
+    fn a_burst_reads_the_sensed_values() {
         let (mut part, counts) = sensing();
         let words = [[0x3E00].as_slice(), &[0; 12]].concat();
         let burst = Row { source: "adis_buffer.c:47", words: &words, low_ns: 0, high_ns: MESSAGE_NS };
@@ -187,9 +187,10 @@ mod linux {
         assert_eq!((violations(&part), notes(&part)), (vec![], vec![]));
     }
 
-    /// `adis16400_set_freq`. At 12.8 and 4 SPS it forgets the −1 of the slow time base: the rates are 10.57 and 3.78 SPS.
+    /// `adis16400_set_freq`: at 12.8 and 4 SPS it omits the −1 of the slow time base, so the rates are 10.57 and 3.78
+    /// SPS.
     #[test]
-    fn rates() {
+    fn each_rate_has_its_register_value_and_its_sample_period() {
         for (millihertz, smpl_prd, hz) in [
             (819_200, 0x01, 819.2),
             (409_600, 0x03, 409.6),
@@ -228,10 +229,10 @@ mod linux {
         }
     }
 
-    /// `adis16400_stop_device` writes SLP_CNT = 0x0100. The first frame of the next probe has chip select low for 8 µs and its delay
-    /// of 50 µs, which wakes the part (20 µs, Table 1); it answers 4 ms later, in the wait for the self-test.
+    /// `adis16400_stop_device` writes SLP_CNT = 0x0100. The first frame of the next probe has chip select low for 8 µs and its delay of 50
+    /// µs, which wakes the part (20 µs, Table 1). The part answers 4 ms later, during the wait for the self-test.
     #[test]
-    fn removed_and_probed_again() {
+    fn a_part_that_was_put_to_sleep_answers_the_next_probe() {
         let (mut part, counts) = sensing();
         probe(&mut part);
         write_16(&mut part, FAST_HZ, 0x3A, 0x0100);
@@ -241,13 +242,14 @@ mod linux {
         wait(&mut part, 50 * MS);
         let words: Vec<u16> = (0x02..=0x18).step_by(2).map(|address| read(&mut part, FAST_HZ, address)).collect();
         assert_eq!(decoded(&words), counts);
-        // Words that were sent while the part slept and woke up are lost.
+        // Words sent while the part slept and woke up are lost.
         let lost =
             |kind: &ViolationKind| matches!(kind, ViolationKind::Busy { activity: Activity::Sleep | Activity::WakeUp });
         assert!(violations(&part).iter().all(lost), "{:?}", violations(&part));
     }
 
-    /// debugfs writes registers of 8 bits as 16: a command and its upper byte while the part is busy, and unused bytes.
+    /// debugfs writes 16 bits to registers of 8 bits: a command with its upper byte while the part is busy, and unused
+    /// bytes.
     #[test]
     fn unused_bytes_are_tolerated() {
         let (mut part, _) = sensing();
@@ -261,7 +263,7 @@ mod linux {
         assert_eq!(notes(&part), [unused(0x37), unused(0x45), NoteKind::SecondCommandByte]);
     }
 
-    /// The flash test takes 17 ms (Table 1); `self_test_ms` is 12, so that a damaged flash is not seen.
+    /// The flash test takes 17 ms (Table 1), but `self_test_ms` is 12, so damaged flash is not detected.
     #[test]
     fn its_flash_test_is_read_too_soon() {
         let (mut part, _) = sensing();
@@ -271,7 +273,7 @@ mod linux {
         assert_eq!(read(&mut part, FAST_HZ, 0x3C), 1 << DiagnosisFlag::FlashChecksum as u8);
     }
 
-    /// `adis16400_read_raw` takes the 13 bits of XGYRO_OFF for 12.
+    /// `adis16400_read_raw` reads XGYRO_OFF with 12 bits instead of 13.
     #[test]
     fn its_calibbias_loses_a_bit() {
         let (mut part, _) = sensing();
@@ -281,7 +283,7 @@ mod linux {
         assert_eq!(violations(&part), []);
     }
 
-    /// Below 4.1 Hz at 819.2 SPS `__adis16400_set_filter` takes M = 7, which Table 17 does not have.
+    /// Below 4.1 Hz at 819.2 SPS `__adis16400_set_filter` selects M = 7, which Table 17 does not have.
     #[test]
     fn its_filter_of_4_hz_is_no_setting() {
         let (mut part, _) = sensing();
@@ -299,7 +301,7 @@ mod linux {
         assert_eq!(part.next_data_ready(), u64::MAX);
     }
 
-    /// `adis16400_set_freq` raises the clock to 2 MHz before the frame that ends low-power mode, which takes 300 kHz at most.
+    /// `adis16400_set_freq` raises the clock to 2 MHz before the frame that ends low-power mode, in which at most 300 kHz are allowed.
     #[test]
     fn its_return_to_a_fast_rate_is_not_heard() {
         let (mut part, _) = sensing();
@@ -316,18 +318,18 @@ mod linux {
 mod psas {
     use super::*;
 
-    /// 84 MHz of the peripheral bus over 128 (`ADIS16405.c:76`).
+    /// The clock is 84 MHz of the peripheral bus over 128 (`ADIS16405.c:76`).
     const SCK_HZ: u32 = 656_250;
 
-    /// `adis_get`: `spiSend`, then `spiReceive`, which sends ones, with chip select low throughout. The code has no pause between
-    /// the two; it is what the operating system takes.
+    /// `adis_get`: `spiSend`, then `spiReceive`, which sends ones, with chip select low throughout. The pause between the two is the time
+    /// of the operating system.
     fn get(part: &mut VirtualAdis16405, address: u8, system_ns: u64) -> u16 {
         let words = [u16::from(address) << 8, 0xFFFF];
         let row = Row { source: "ADIS16405.c:102", words: &words, low_ns: system_ns, high_ns: 20_000 };
         run(part, SCK_HZ, &[row])[1]
     }
 
-    /// `adis_set`: both bytes in one `spiSend`, without a stall.
+    /// `adis_set` sends both bytes in one `spiSend`, without a stall.
     fn set(part: &mut VirtualAdis16405, address: u8, value: u16) {
         let [upper, lower] = value.to_be_bytes();
         let frame = |address: u8, byte: u8| 0x8000 | u16::from(address) << 8 | u16::from(byte);
@@ -336,7 +338,7 @@ mod psas {
     }
 
     #[test]
-    fn a_burst() {
+    fn a_burst_reads_the_sensed_values() {
         let (mut part, counts) = sensing();
         let words = [[0x3E00].as_slice(), &[0; 12]].concat();
         let burst = Row { source: "ADIS16405.c:47", words: &words, low_ns: 0, high_ns: 20_000 };
@@ -345,7 +347,7 @@ mod psas {
         assert_eq!((violations(&part), notes(&part)), (vec![], vec![]));
     }
 
-    /// With chip select low between the frames a read works where the operating system takes the 9 µs of the stall.
+    /// Chip select stays low between the frames. A read works if the operating system takes the 9 µs of the stall.
     #[test]
     fn a_read_needs_the_stall_although_chip_select_stays_low() {
         let (mut part, _) = sensing();
@@ -356,8 +358,8 @@ mod psas {
         assert_eq!(violations(&part), [ViolationKind::Stall { stall_ns: 5_000, least_ns: 9_000 }]);
     }
 
-    /// The second frame comes without a stall and is lost: of MSC_CTRL = 0x0406 (`adis_self_test`) the part takes the upper byte, which
-    /// is why the self-test runs.
+    /// The second frame comes without a stall and is lost. Of MSC_CTRL = 0x0406 (`adis_self_test`) the part receives only the upper byte,
+    /// so the self-test runs.
     #[test]
     fn the_second_byte_of_a_write_is_lost() {
         let (mut part, _) = sensing();
@@ -370,7 +372,7 @@ mod psas {
 
     /// `adis_reset` holds the reset line low for 500 ms.
     #[test]
-    fn the_reset_line() {
+    fn the_part_answers_after_its_reset_line_was_low() {
         let (mut part, _) = sensing();
         part.drive_reset(false);
         wait(&mut part, 500 * MS);
@@ -384,9 +386,9 @@ mod psas {
 mod canopus {
     use super::*;
 
-    /// 12.5 MHz over 63 (`drivers/tms570/spi.c:61`).
+    /// The clock is 12.5 MHz over 63 (`drivers/tms570/spi.c:61`).
     const SCK_HZ: u32 = 198_413;
-    /// `vTaskDelay(1)`, taken as 1 ms.
+    /// `vTaskDelay(1)` is assumed to be 1 ms.
     const TICK_NS: u64 = MS;
 
     fn read(part: &mut VirtualAdis16405, address: u8) -> u16 {
@@ -409,10 +411,10 @@ mod canopus {
         run(part, SCK_HZ, &rows);
     }
 
-    /// `aocs.c:160, 632`, then `configure_imu` (`aocs.c:270`) with the values of `aocs.h`, and what is read back. SENS_AVG is written
-    /// filter first, which the range of ±75 °/s leaves at 64 taps.
+    /// `aocs.c:160, 632`, then `configure_imu` (`aocs.c:270`) with the values of `aocs.h`; the registers are read back. SENS_AVG is written
+    /// with the filter first, and the range of ±75 °/s keeps it at 64 taps.
     #[test]
-    fn identity_configuration_and_burst() {
+    fn identity_configuration_and_burst_read_as_written_and_sensed() {
         let (mut part, counts) = sensing();
         part.power_off();
         part.power_on();
@@ -423,11 +425,11 @@ mod canopus {
         write(&mut part, 0x26, 199);
         assert_eq!([0x38, 0x34, 0x26].map(|address| read(&mut part, address)), [0x0106, 0x0006, 199]);
         wait(&mut part, 300 * MS);
-        // adis_imu.c:95, as one transaction.
+        // adis_imu.c:95 is one transaction.
         let words = [[0x3E00].as_slice(), &[0; 12]].concat();
         let burst = Row { source: "adis_imu.c:95", words: &words, low_ns: 0, high_ns: TICK_NS };
         let decoded = decoded(&run(&mut part, SCK_HZ, &[burst])[1..]);
-        // ±75 °/s is 0.0125 °/s a count (Table 1): of 60 °/s, −60.3 °/s and 0.7 °/s.
+        // At ±75 °/s a count is 0.0125 °/s (Table 1): the sensed values are 60 °/s, −60.3 °/s and 0.7 °/s.
         assert_eq!(decoded[1..4], [4800, -4824, 56]);
         assert_eq!(decoded[4..7], counts[4..7]);
         assert_eq!(decoded[7], counts[7] + 199);
@@ -436,7 +438,7 @@ mod canopus {
 
     #[test]
     fn a_register_is_written_read_and_restored() {
-        // aocs_tests.c:28 to 39.
+        // The steps are those of aocs_tests.c:28 to 39.
         let (mut part, _) = sensing();
         let before = read(&mut part, 0x20);
         write(&mut part, 0x20, 0x075A);
@@ -446,8 +448,8 @@ mod canopus {
         assert_eq!((violations(&part), notes(&part)), (vec![], vec![]));
     }
 
-    /// `portTICK_RATE_MS / 100` is 0 ticks (`aocs_tests.c:55`): DIAG_STAT is read before the 12 ms of the self-test are over, and a
-    /// broken sensor is not seen.
+    /// `portTICK_RATE_MS / 100` is 0 ticks (`aocs_tests.c:55`). DIAG_STAT is read before the 12 ms of the self-test are over, so a broken
+    /// sensor is not detected.
     #[test]
     fn its_self_test_is_read_too_soon() {
         let (mut part, _) = sensing();
@@ -460,7 +462,7 @@ mod canopus {
     }
 }
 
-/// Owners report failures of bursts above 1 MHz (Table 2): Spalax and others clock them at 1.3 to 2.6 MHz.
+/// Owners report failures of bursts above 1 MHz (Table 2); Spalax and others clock them at 1.3 to 2.6 MHz.
 #[test]
 fn a_burst_above_1_mhz_is_garbled() {
     for (sck_hz, right) in [(1_000_000, true), (1_312_500, false), (2_000_000, false), (2_625_000, false)] {

@@ -1,5 +1,5 @@
-//! Procedures of the real driver on the virtual part: results, side effects, and a silent bus where the part needs one.
-//! Every script runs through the blocking and through the asynchronous driver.
+//! Procedures of the real driver on the virtual part: results, side effects, and a silent bus if the part needs one.
+//! Every script runs through the blocking and the asynchronous driver.
 
 use std::num::NonZeroU8;
 use std::pin::pin;
@@ -21,7 +21,7 @@ fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
-/// A part that starts up from time 0 and answers garbage meanwhile, needs 1 µs of chip select high between frames, and
+/// A part that starts up from time 0 and answers garbage until then, needs 1 µs of chip select high between frames, and
 /// refreshes its slow words with every fourth sample.
 fn demanding_part(model: NoiseModel) -> VirtualAdis16405 {
     let mut part = VirtualAdis16405::cold(model, 1);
@@ -31,9 +31,9 @@ fn demanding_part(model: NoiseModel) -> VirtualAdis16405 {
     part
 }
 
-/// Runs a script through both shells. `$imu` has started up on the part behind `$bus`. Lines are
-/// `expect call => value;` or `take name = call;`, where the call is awaited in the asynchronous run, `given
-/// name = value;`, `then action;`, or `fails call => error => check;`.
+/// Runs a script through both fronts. `$imu` has started up on the part behind `$bus`. Lines are `expect call =>
+/// value;` or `take name = call;`, where the call is awaited in the asynchronous run, `given name = value;`, `then
+/// action;`, or `fails call => error => check;`.
 macro_rules! both_shells {
     ($model:expr, |$bus:ident, $imu:ident| $($script:tt)*) => {{
         {
@@ -88,7 +88,7 @@ fn self_tests_name_the_failed_sensor_and_keep_the_configuration() {
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.set_data_ready(None) => Ok(());
         expect imu.set_compensation(OnChipCompensation { linear_acceleration: true, origin_alignment: false }) => Ok(());
-        // Compensation, polarity and no data ready: bit 2 and with it bit 1 and 0 are cleared.
+        // Bit 7, the compensation, is set; data ready is off, so bits 2, 1 and 0 are clear.
         expect imu.read_register(Register::MscCtrl) => Ok(0x0080);
         take test = imu.self_test();
         then assert!(test.passed() && test.ran && test.before.is_empty());
@@ -118,7 +118,7 @@ fn a_self_test_keeps_the_diagnosis_from_before() {
         take test = imu.self_test();
         then assert_eq!(test.before, Diagnosis::SUPPLY_HIGH);
         then assert!(test.passed());
-        // It persists, so it comes back with the next sample.
+        // The cause persists, so the flag comes back with the next sample.
         then bus.wait_for_data();
         expect imu.diagnosis() => Ok(Diagnosis::SUPPLY_HIGH);
     );
@@ -126,7 +126,8 @@ fn a_self_test_keeps_the_diagnosis_from_before() {
 
 #[test]
 fn a_stimulus_moves_the_gyros_both_ways_and_the_accelerometers_one() {
-    // The virtual part moves by 40 °/s and 0.5 g: 800 and 150.15 counts. The negative stimulus is for gyros only (Table 22).
+    // The stimulus moves the virtual part by 40 °/s and 0.5 g: 800 and 150.15 counts. The negative stimulus is for
+    // gyros only (Table 22).
     let expected = [800, 800, 800, 150, 150, 150];
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.stimulus_response(Stimulus::Positive) => Ok(expected);
@@ -147,8 +148,8 @@ fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
         then assert_eq!(sample.gyro_udps(), [0, 0, 0]);
         then assert_eq!(sample.accl_ug(), [0, 0, -999_000]);
         expect imu.gyro_offsets() => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
-        // The part has written its flash by itself (page 13): a reset loads the negative correction of x, which must neither
-        // stay there nor be applied twice.
+        // The part has written its flash (page 13). A reset loads the negative correction of x, which must neither stay
+        // there nor be applied twice.
         expect imu.flash_writes() => Ok(1);
         expect imu.software_reset() => Ok(Product::Adis16405);
         expect imu.gyro_offsets() => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
@@ -170,11 +171,11 @@ fn the_precision_auto_null_averages_for_thirty_silent_seconds() {
         given samples = bus.part().samples();
         take bias = imu.precision_auto_null();
         then assert!(bus.part().now() - before >= 30_050_000_000);
-        // 30 s offline, then a flash update (page 13).
-        // In 31 s it has sampled for 0.95 s: 778 times.
+        // The procedure takes 30 s offline, then a flash update (page 13).
+        // In 31 s the part has sampled for 0.95 s: 778 times.
         then assert!((770..790).contains(&(bus.part().samples() - samples)));
         expect imu.flash_writes() => Ok(1);
-        // White noise of 0.05 °/√s over 30 s leaves 0.0091 °/s, 0.73 counts; five of these.
+        // White noise of 0.05 °/√s over 30 s leaves 0.0091 °/s, 0.73 counts; the tolerance is five of these.
         then for (offset, expected) in bias.total().into_iter().zip([40, -20, 0]) { assert!((offset - expected).abs() <= 4) };
     );
 }
@@ -202,7 +203,7 @@ fn a_flash_update_outlives_a_reset() {
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.flash_writes() => Ok(0);
         expect imu.set_accl_offsets([1, 2, 3]) => Ok(());
-        // A failed update before left its flag in DIAG_STAT.
+        // An earlier failed update left its flag in DIAG_STAT.
         then bus.part_mut().damage_flash();
         expect imu.write_register(Register::GlobCmd, 1 << 3) => Ok(());
         then { let now = bus.part().now(); bus.advance_to(now + 100_000_000) };
@@ -227,11 +228,11 @@ fn a_flash_update_outlives_a_reset() {
 }
 
 #[test]
-fn sleep_and_wake() {
+fn a_sleep_lasts_as_long_as_requested_or_until_the_part_is_woken() {
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.sleep(Sleep::HalfSeconds(NonZeroU8::new(3).unwrap())) => Ok(());
         given slept = bus.part().now();
-        // Asleep for 1.5 s, 4 ms to recover, one period to the first sample.
+        // The part sleeps for 1.5 s, recovers for 4 ms, and takes its first sample a period later.
         then assert_eq!(bus.wait_for_data(), None);
         then bus.advance_to(slept + 1_504_500_000);
         then assert!(bus.wait_for_data().unwrap() <= slept + 1_506_000_000);
@@ -252,7 +253,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
     let change =
         Alarm { source: Channel::GyroY, watch: AlarmWatch::RateOfChange(4), threshold: AlarmThreshold::Above(99) };
     both_shells!(NoiseModel::noiseless(), |bus, imu|
-        // A period of 4.9 ms, so that no sample is taken before the alarms are set.
+        // The period of 4.9 ms is long enough that no sample is taken before the alarms are set.
         expect imu.set_sample_rate(204.8) => Ok(204.8);
         expect imu.set_alarm_output(Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
         expect imu.set_alarm(AlarmNumber::One, Some(above)) => Ok(());
@@ -272,7 +273,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
         expect imu.diagnosis() => Ok(Diagnosis::empty());
         then for _ in 0..8 { bus.wait_for_data(); };
         expect imu.diagnosis() => Ok(Diagnosis::empty());
-        // A step of 100 counts of 0.05 °/s, by way of the offset: 400 counts of 0.0125 °/s.
+        // The offset makes a step of 100 counts of 0.05 °/s: 400 counts of 0.0125 °/s.
         expect imu.set_gyro_offsets([0, 400, 0]) => Ok(GyroBias { part: [0, 400, 0], host_x: 0 });
         then for _ in 0..2 { bus.wait_for_data(); };
         expect imu.diagnosis() => Ok(Diagnosis::ALARM_2);
@@ -348,11 +349,11 @@ fn another_product_or_a_missing_part_is_an_error() {
     );
 }
 
-/// EngineerZone, thread 81805: −8 read as 0x9FF8 instead of 0xBFF8, by burst and then by single reads.
+/// EngineerZone, thread 81805: −8 was read as 0x9FF8 instead of 0xBFF8, in a burst and in single reads after it.
 #[test]
 fn the_x_gyro_erratum_occurs_and_is_avoided() {
     both_shells!(with_rates([-0.2, -0.2, -0.2]), |bus, imu|
-        // −16 counts of 0.0125 °/s: with −0.2 °/s the rate is −0.4 °/s, −8 counts.
+        // The offset is −16 counts of 0.0125 °/s. With −0.2 °/s the rate is −0.4 °/s, −8 counts.
         expect imu.write_register(Register::XgyroOff, 0xFFF0) => Ok(());
         then bus.wait_for_data();
         expect imu.read_register(Register::XgyroOut) => Ok(0xBFF8);

@@ -2,7 +2,7 @@
 
 use virtual_sensor::{NoiseModel, NoteKind, ViolationKind, VirtualAdis16405};
 
-/// Address, bits, reset value, sign-extended, in flash: the readable and writable registers.
+/// The readable and writable registers: address, bits, reset value, sign-extended, in flash.
 const WRITABLE: [(u8, u32, u16, bool, bool); 23] = [
     (0x1A, 13, 0x0000, true, true),
     (0x1C, 13, 0x0000, true, true),
@@ -24,7 +24,7 @@ const WRITABLE: [(u8, u32, u16, bool, bool); 23] = [
     (0x46, 8, 0x0000, false, true),
     (0x48, 16, 0x0000, false, true),
     (0x4A, 12, 0x0000, false, false),
-    // The directions only: the levels of inputs come from the pins.
+    // Only the directions are writable: the levels of inputs come from the pins.
     (0x32, 4, 0x0000, false, false),
     // The upper byte starts self-tests.
     (0x34, 8, 0x0006, false, true),
@@ -35,7 +35,7 @@ fn part() -> VirtualAdis16405 {
     VirtualAdis16405::new(NoiseModel::noiseless(), 1)
 }
 
-/// Exchanges one frame after a pause that is long enough in either power mode.
+/// Exchanges one frame after a pause that suits either power mode.
 fn frame(part: &mut VirtualAdis16405, word: u16) -> u16 {
     part.advance_to(part.now() + 150_000);
     part.select();
@@ -80,7 +80,7 @@ fn bytes_are_written_one_by_one_into_the_width_of_the_register() {
                 write(&mut part, address + 1, byte);
                 let mut both = u16::from(byte) << 8 | u16::from(byte);
                 if address == 0x38 {
-                    // The ranges of ±150 and ±75 °/s need M ≥ 2 and M ≥ 4 (Table 17), and raise it.
+                    // The ranges of ±150 and ±75 °/s need M ≥ 2 and M ≥ 4 (Table 17), and raise M to it.
                     let least = [0, 4, 2, 0, 0, 0, 0, 0][usize::from(byte & 0b111)];
                     both = both & !0b111 | (both & 0b111).max(least);
                 }
@@ -95,7 +95,7 @@ fn access_to_what_cannot_be_read_or_written_is_a_violation() {
     let plain: Vec<u8> = WRITABLE.iter().filter(|row| row.1 > 0).map(|row| row.0).collect();
     for address in 0..0x80u8 {
         let row = WRITABLE.iter().find(|row| row.0 == address & 0x7E && plain.contains(&row.0));
-        // GPIO_CTRL and MSC_CTRL have 12 bits; SLP_CNT 9, GLOB_CMD 8.
+        // GPIO_CTRL and MSC_CTRL have 12 bits, SLP_CNT 9, GLOB_CMD 8.
         let bits = match address & 0x7E {
             0x32 | 0x34 => 12,
             0x3A => 9,
@@ -106,7 +106,7 @@ fn access_to_what_cannot_be_read_or_written_is_a_violation() {
         let mut written = part();
         write(&mut written, address, 0);
         let kinds: Vec<_> = written.violations().iter().map(|violation| violation.kind).collect();
-        // Drivers write 0 to the upper bytes of registers of 8 bits: a note.
+        // Drivers write 0 to the upper bytes of registers of 8 bits, which gets a note.
         let unused = matches!(address, 0x37 | 0x3F | 0x45 | 0x47);
         let expected = [ViolationKind::Address { address, write: true }];
         assert_eq!(kinds, if writable || unused { &[][..] } else { &expected[..] }, "write to {address:#04x}");

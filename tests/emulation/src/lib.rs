@@ -1,7 +1,7 @@
-//! A run of an image on an emulated STM32F405: what the tests ask of the emulator (`tests/tools/stm32f4-emulator`), and its answer.
+//! A run of an image on an emulated STM32F405: the requests of the tests to the emulator (`tests/tools/stm32f4-emulator`), and its results.
 //!
-//! The emulator is a program of its own, since it pulls a compiler of machine code and asks for a newer Rust. It reads a [`Scenario`] from its
-//! standard input and writes an [`Outcome`] to its standard output, both in the format of postcard.
+//! The emulator is a separate program, since it depends on a compiler of machine code and needs a newer Rust. It reads a [`Scenario`] from
+//! its standard input and writes an [`Outcome`] to its standard output, both in the format of postcard.
 
 mod sensors;
 
@@ -28,25 +28,25 @@ pub const FLASH_CR: u64 = 0x4002_3C10;
 pub const FLASH_OPTCR: u64 = 0x4002_3C14;
 /// Control register 1 of SPI1, whose bits 0 and 1 are CPHA and CPOL (RM0090 section 28.5.1).
 pub const SPI1_CR1: u64 = 0x4001_3000;
-/// CRC polynomial of SPI1, which the firmware does not use: 7 after a reset of the peripheral (RM0090 section 28.5.5).
+/// CRC polynomial of SPI1, which the firmware does not use; 7 after a reset of the peripheral (RM0090 section 28.5.5).
 pub const SPI1_CRCPR: u64 = 0x4001_3010;
-/// Which port each of the lines 0 to 7 of the external interrupt controller is connected to (RM0090 section 9.2).
+/// Ports to which the lines 0 to 7 of the external interrupt controller are connected (RM0090 section 9.2).
 pub const SYSCFG_EXTICR: [u64; 2] = [0x4001_3808, 0x4001_380C];
-/// Lines that raise an interrupt, and those whose rising and whose falling edges do (RM0090 section 12.3).
+/// Lines that raise an interrupt, and those that do so at rising and at falling edges (RM0090 section 12.3).
 pub const EXTI_IMR: u64 = 0x4001_3C00;
 pub const EXTI_RTSR: u64 = 0x4001_3C08;
 pub const EXTI_FTSR: u64 = 0x4001_3C0C;
-/// Peripherals that stop while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
+/// Peripherals that stop while a debugger halts the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
 pub const DBGMCU_APB1_FZ: u64 = 0xE004_2008;
 
-/// Which memory is at address 0; 1 in its lowest two bits is system memory (RM0090 section 9.2.1).
+/// Memory that is at address 0; 1 in its lowest two bits is system memory (RM0090 section 9.2.1).
 pub const SYSCFG_MEMRMP: u64 = 0x4001_3800;
 
-/// The bus clock of the boards, 42 MHz, divided by the first power of two that brings it to 1 MHz or less, and to 300 kHz or less.
+/// The boards' bus clock of 42 MHz, divided by the first power of two that gives at most 1 MHz, and at most 300 kHz.
 pub const SCK_HZ: u32 = 42_000_000 / 64;
 pub const SLOW_SCK_HZ: u32 = 42_000_000 / 256;
 
-/// A board as its documents describe it: crystal, and what the image's pins are connected to.
+/// The wiring of a board by its documents: crystal, and the connections of the image's pins.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Wiring {
     pub crystal_hz: u64,
@@ -54,7 +54,7 @@ pub struct Wiring {
     pub data_ready: (usize, u8),
     /// Index of the USART that is connected to the host: 1 for USART2.
     pub usart: usize,
-    /// Port and pin of its receiver.
+    /// Port and pin of the USART's receiver.
     pub receiver: (usize, u8),
     /// Port and pin of the LED.
     pub led: (usize, u8),
@@ -69,9 +69,9 @@ pub const FEATHER: Wiring =
 /// A debug probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Probe {
-    /// It reads the log.
+    /// The probe reads the log.
     Reads,
-    /// It asks the image to wait for it when the log is full, as probe-rs does, and reads nothing.
+    /// The probe makes the image wait for it when the log is full, as probe-rs does, and reads nothing.
     Stalls,
 }
 
@@ -80,17 +80,17 @@ pub enum Probe {
 pub enum Event {
     /// The sensor resets itself, as after a dip of its supply.
     SensorReset,
-    /// The sensor is put to sleep, without end.
+    /// The sensor is put to sleep indefinitely.
     SensorSleep,
-    /// Something else writes this frame to the sensor.
+    /// Another device writes this frame to the sensor.
     WriteRegister(u16),
     /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
     /// The data-ready line changes its level every 4 us for this time, in ns.
     Oscillate(u64),
-    /// So many of the next data-ready edges do not reach the processor.
+    /// This number of data-ready edges do not reach the processor.
     LoseEdges(u32),
-    /// The sensor is unplugged (no edges, and zeros on the data line), or plugged in again.
+    /// The sensor is unplugged (no edges, zeros on the data line), or plugged in again.
     Unplugged(bool),
     /// The reset pin is pulsed.
     ResetPin,
@@ -106,24 +106,24 @@ pub enum Event {
     StopCounter,
     /// The next access to the timer is answered with a bus error.
     BusError,
-    /// Every aligned word pair of memory that holds this value becomes 0.
+    /// Every aligned pair of words in memory that holds this value becomes 0.
     ClearInMemory(u64),
 }
 
-/// Parts of a run.
+/// The parameters of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scenario {
     pub wiring: Wiring,
-    /// The crystal does not start.
+    /// True if the crystal does not start.
     pub crystal_fails: bool,
     pub sensor: Option<Sensor>,
-    /// Keys sent over the serial port, by rising time in s.
+    /// Keys sent over the serial port, each with its time in s, in order.
     pub keys: Vec<(f64, Vec<u8>)>,
-    /// By rising time in s.
+    /// Events, each with its time in s, in order.
     pub events: Vec<(f64, Event)>,
     pub seconds: f64,
     pub probe: Option<Probe>,
-    /// The core executes an instruction in eight cycles in the place of one: what waits for a peripheral costs an eighth to emulate.
+    /// True if the core takes eight cycles per instruction instead of one, so that waiting for a peripheral costs an eighth to emulate.
     pub slow_core: bool,
 }
 
@@ -145,7 +145,7 @@ impl Default for Scenario {
 /// Instructions executed and samples taken up to a time.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Work {
-    /// In ns.
+    /// The time, ns.
     pub at: u64,
     pub instructions: u64,
     pub samples: u64,
@@ -154,11 +154,11 @@ pub struct Work {
 /// Record of the sensor on the bus.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct BusRecord {
-    /// Samples that the part has made.
+    /// Number of samples that the part has taken.
     pub samples: u64,
-    /// Violations of the timing of its bus, in words.
+    /// Violations of the bus timing, as text.
     pub violations: Vec<String>,
-    /// The answer of the part to each burst, in order, with the number of its latest sample at that time.
+    /// The part's answer to each burst in order, with the number of its latest sample at that time.
     pub bursts: Vec<(u64, [u8; BURST_BYTES])>,
     /// Shortest time from one byte to the next within a frame, in ns.
     pub shortest_byte_ns: u64,
@@ -170,11 +170,11 @@ pub struct BusRecord {
     pub shortest_read_ns: u64,
     /// Times for which chip select was low without a clock, in ns.
     pub pulses_ns: Vec<u64>,
-    /// Words of another width than eight bits.
+    /// Number of words that do not have eight bits.
     pub odd_words: u64,
 }
 
-/// A line of the log that the image leaves in its memory (RTT), decoded by the table of formats in its ELF.
+/// A line of the log (RTT) in the image's memory, decoded by the table of formats in its ELF.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LogLine {
     pub level: String,
@@ -187,11 +187,11 @@ pub struct Outcome {
     pub sensor: Option<BusRecord>,
     /// Bytes from the serial port, each with the time in ns at which its stop bit ended.
     pub received: Vec<(u64, u8)>,
-    /// Reports of the emulator: accesses to unmapped addresses, registers without a model, resets.
+    /// Messages of the emulator: accesses to unmapped addresses, registers without a model, resets.
     pub diagnostics: Vec<String>,
     /// One value per virtual second, and one at the end.
     pub work: Vec<Work>,
-    /// Changes of the LED's level.
+    /// Number of changes of the LED's level.
     pub led_changes: u32,
     /// Registers at the end, by address: speeds and pulls of ports A to C, and the others that this crate names.
     pub registers: BTreeMap<u64, u64>,

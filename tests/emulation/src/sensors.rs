@@ -5,19 +5,19 @@ use virtual_sensor::{
     Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario, TemperatureProfile, VirtualAdis16405,
 };
 
-/// A sensor of a run.
+/// The sensor of a run.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub enum Sensor {
-    /// With the noise of the published characterisation, by its seed.
+    /// A part with the noise of the published characterisation and this seed.
     Published(u64),
-    /// [`warming_part`] without an effect.
+    /// The part [`warming_part`] without an effect.
     Warming,
-    /// [`warming_part`] with [`four_effects`].
+    /// The part [`warming_part`] with [`four_effects`].
     WarmingWithFourEffects,
 }
 
 impl Sensor {
-    /// The part itself.
+    /// The virtual part of this sensor.
     pub fn part(self) -> VirtualAdis16405 {
         match self {
             Self::Published(seed) => VirtualAdis16405::new(NoiseModel::paper(), seed),
@@ -33,12 +33,12 @@ pub const RATE_HZ: f64 = 204.8;
 pub const SENSITIVITY: f64 = 0.05;
 /// Size of the steps of accelerometer x, g.
 pub const STEP_G: f64 = 0.05;
-/// Frequency of the line on gyro z.
+/// Frequency of the line on gyro z, Hz.
 pub const LINE_HZ: f64 = 20.5;
 
-/// A part with `effects` that warms up by 8 °C in a room whose temperature cycles with a period of 20 s, of which an epoch has three:
-/// a sensitivity of [`SENSITIVITY`] is then as significant as 7.6 standard deviations, where 4.5 are asked for (derived, and seen in
-/// 40 of 40 epochs, in `simulation/tests/epochs.rs`).
+/// A part with `effects` that warms up by 8 °C in a room whose temperature cycles with a period of 20 s, so that an epoch has three cycles.
+/// A sensitivity of [`SENSITIVITY`] is then as significant as 7.6 standard deviations, and 4.5 are required (derived in
+/// `simulation/tests/epochs.rs`, and found in 40 of 40 epochs there).
 pub fn warming_part(effects: Vec<InjectedEffect>) -> VirtualAdis16405 {
     let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 20.0 };
     let environment = Environment { temperature, ..Environment::default() };
@@ -46,12 +46,11 @@ pub fn warming_part(effects: Vec<InjectedEffect>) -> VirtualAdis16405 {
     VirtualAdis16405::with_scenario(&scenario, NoiseModel::paper(), 1)
 }
 
-/// A temperature effect on gyro x, a Gauss-Markov process on gyro y, a line on gyro z, and on accelerometer x a step in each of two
-/// epochs.
+/// A temperature effect on gyro x, a Gauss-Markov process on gyro y, a line on gyro z, and a step in each of two epochs on accelerometer x.
 ///
-/// A process with the time constant T and the deviation s has an Allan deviation of 0.62·s at most, at 1.9·T (IEEE Std 952:
-/// 0.437·q·√T, with q = s·√(2/T)): 0.25 deg/s at 0.38 s, four times the white noise there. It is named in 40 of 40 epochs
-/// (`simulation/tests/epochs.rs`).
+/// A process with the time constant T and the deviation s has an Allan deviation of at most 0.62·s, at 1.9·T (IEEE Std
+/// 952: 0.437·q·√T, with q = s·√(2/T)). This is 0.25 deg/s at 0.38 s, four times the white noise there. It is named in
+/// 40 of 40 epochs (`simulation/tests/epochs.rs`).
 pub fn four_effects() -> Vec<InjectedEffect> {
     let step = |time_s| InjectedEffect::BiasStep { channel: OutputRegister::AcclX, time_s, size: STEP_G };
     vec![

@@ -1,4 +1,4 @@
-//! Prints what the driver takes of a Cortex-M4F: bytes of flash, and instructions for a burst, counted by QEMU.
+//! Prints the driver's cost on a Cortex-M4F: bytes of flash, and instructions per burst, counted by QEMU.
 
 use driver_footprint::{M4F, added_bytes, build};
 use std::process::Command;

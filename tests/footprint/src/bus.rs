@@ -1,11 +1,11 @@
-//! A bus that always gives the same answer, which the compiler cannot predict.
+//! A bus that always gives the same answer, but not one that the compiler can predict.
 
 use core::convert::Infallible;
 use core::hint::black_box;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-/// Answers 0x8814 to every word: new data, no error and, as a supply, 5 V.
+/// A bus that answers 0x8814 to every word: new data, no error and, as a supply, 5 V.
 #[derive(Clone, Copy)]
 pub(crate) struct Bus {
     answer: [u8; 2],

@@ -1,4 +1,4 @@
-//! One call of allan-core, or none: the one that the environment variable `ALLAN_CALL` names when this is compiled.
+//! One call of allan-core, named by the environment variable `ALLAN_CALL` at compile time, or no call.
 
 use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
 use allan_core::regression::CovariateRegression;
@@ -15,7 +15,7 @@ const CALL: &str = match option_env!("ALLAN_CALL") {
 };
 
 pub(crate) fn run() {
-    // Values that the calls work on, in the image without a call too.
+    // These values exist also in the image without a call.
     let mut cascade = black_box(Cascade::<24, 8>::new());
     let mut curve = black_box(Curve::<24>::empty());
     let mut bytes = black_box([0_u8; 4_500]);
@@ -23,7 +23,7 @@ pub(crate) fn run() {
         "Cascade::push" => cascade.push(black_box(1)),
         "Cascade::push_slice" => cascade.push_slice(black_box(&[1, 2, 3])),
         "Cascade::gap" => {
-            // The push after a gap closes it.
+            // The next push closes the gap.
             cascade.gap(black_box(1));
             cascade.push(black_box(1));
         }

@@ -1,6 +1,6 @@
-//! Instructions of a burst, of its decoding, its validation and its values, each counted alone.
+//! Instructions of a burst, of its decoding, of its validation and of its values, each counted separately.
 //!
-//! With QEMU's `-icount shift=0` an instruction takes 1 ns, and SysTick counts at 25 MHz: a tick is 40 instructions.
+//! QEMU's `-icount shift=0` makes an instruction take 1 ns. SysTick counts at 25 MHz, so a tick is 40 instructions.
 
 use crate::bus::Bus;
 use adis16405_driver::{Adis16405, BURST_BYTES, Burst, BurstValidator, Config};
@@ -39,7 +39,7 @@ pub(crate) fn count(bus: Bus) {
     report("burst", || imu.burst());
 }
 
-/// Prints how many instructions each of [`TIMES`] runs took on average.
+/// Prints the average instructions of a run, over [`TIMES`] runs.
 fn report<T>(name: &str, mut work: impl FnMut() -> T) {
     let start = SYST::get_current();
     (0..TIMES).for_each(|_| {

@@ -17,7 +17,7 @@ pub fn build(target: &str, features: &str) -> PathBuf {
     build_with_call(target, features, "")
 }
 
-/// As [`build`], with the call of allan-core that the feature `calls` links.
+/// Builds the image as [`build`] does, with the call of allan-core that the feature `calls` links.
 fn build_with_call(target: &str, features: &str, call: &str) -> PathBuf {
     let image = Image {
         package: "driver-footprint",
@@ -30,7 +30,7 @@ fn build_with_call(target: &str, features: &str, call: &str) -> PathBuf {
     image.build(&format!("footprint-{target}-{features}-{}", call.replace("::", "-")))
 }
 
-/// The image with these features.
+/// The ELF of the image with these features.
 pub fn built(target: &str, features: &str) -> Vec<u8> {
     built_with_call(target, features, "")
 }
@@ -39,7 +39,7 @@ fn built_with_call(target: &str, features: &str, call: &str) -> Vec<u8> {
     std::fs::read(build_with_call(target, features, call)).expect("the image is readable")
 }
 
-/// Bytes of flash that the image takes, which are those that its program headers load (ELF of 32 bits, little-endian).
+/// Bytes of flash of the image: those that its program headers load (ELF of 32 bits, little-endian).
 pub fn flash_bytes(elf: &[u8]) -> u32 {
     const LOAD: u32 = 1;
     let word = |at: usize| u32::from_le_bytes(elf[at..at + 4].try_into().expect("four bytes"));
@@ -55,7 +55,7 @@ pub fn added_bytes(target: &str, features: &str) -> u32 {
     flash_bytes(&built(target, features)) - flash_bytes(&built(target, ""))
 }
 
-/// Bytes of flash that a call of allan-core adds to an image without any; 0 for a call that the image does not know.
+/// Bytes of flash that a call of allan-core adds to an image without calls; 0 if the image does not know the call.
 pub fn call_bytes(target: &str, call: &str) -> u32 {
     let bytes = |call: &str| flash_bytes(&built_with_call(target, "calls", call));
     static WITHOUT: Mutex<BTreeMap<String, u32>> = Mutex::new(BTreeMap::new());
@@ -64,7 +64,7 @@ pub fn call_bytes(target: &str, call: &str) -> u32 {
     bytes(call).saturating_sub(without)
 }
 
-/// Names of the functions in an image that belong to a panic.
+/// Names of the functions in an image that are part of a panic.
 pub fn panic_symbols(elf: &[u8]) -> Vec<String> {
     use object::{Object, ObjectSymbol, SymbolKind};
     let elf = object::File::parse(elf).expect("an ELF");

@@ -1,4 +1,4 @@
-//! An image that uses the part of the driver or of allan-core that its features choose, or counts the instructions of a
+//! An image that uses the part of the driver or of allan-core selected by its features, or counts the instructions of a
 //! burst.
 #![no_std]
 #![no_main]

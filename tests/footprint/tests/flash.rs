@@ -1,9 +1,9 @@
-//! Flash that the libraries take of a Cortex-M.
+//! Flash of the libraries on a Cortex-M.
 
 use driver_footprint::{M0_PLUS, M4F, added_bytes, built, flash_bytes, panic_symbols};
 use system_tests::generated_within;
 
-/// The limits are the sizes measured when the test was written, and a tenth.
+/// The limits are the sizes when the test was written, plus a tenth.
 #[test]
 fn the_driver_takes_at_most_a_tenth_more_flash_than_when_it_was_measured() {
     for (features, limit) in [("burst", 7_300), ("everything", 21_100), ("asynchronous", 31_300)] {
@@ -13,12 +13,12 @@ fn the_driver_takes_at_most_a_tenth_more_flash_than_when_it_was_measured() {
     }
 }
 
-/// A whole image for a Cortex-M4F, whose floating-point unit has single precision.
+/// A whole image for a Cortex-M4F, which has a single-precision floating-point unit.
 struct WholeImage {
-    /// In the tables of the documentation.
+    /// Label in the tables of the documentation.
     label: &'static str,
     features: &'static str,
-    /// The largest size that was promised, bytes.
+    /// The largest size that the documentation promises, bytes.
     limit: u32,
 }
 
@@ -30,7 +30,7 @@ const IMAGES: [WholeImage; 5] = [
     WholeImage { label: "and `fit` of N, B and K", features: "fit", limit: 57 * 1024 },
 ];
 
-/// A kB is 1,024 bytes. A twentieth may come with the compiler.
+/// A kB is 1,024 bytes. Another compiler may add a twentieth.
 #[test]
 fn the_flash_of_whole_images_is_in_the_docs() {
     let mut rows = String::new();
@@ -49,12 +49,12 @@ fn the_flash_of_whole_images_is_in_the_docs() {
     }
 }
 
-/// The code of a fit is that of all curves: a second estimator adds its own sums and its curve.
+/// All curves share the code of a fit: a second estimator adds only its sums and its curve.
 #[test]
 fn a_second_estimator_of_another_size_links_no_second_fit() {
     let [one, two] = ["fit", "two-fits"].map(|features| added_bytes(M4F, features));
     println!("one fit: {one} bytes, two: {two} bytes");
-    // A second fit would add 23 kB.
+    // The code of a second fit would add 23 kB.
     assert!(two - one <= 11_000, "{} bytes for the second estimator", two - one);
 }
 
@@ -62,7 +62,7 @@ fn a_second_estimator_of_another_size_links_no_second_fit() {
 fn adding_samples_and_gaps_links_no_panic() {
     for target in [M4F, M0_PLUS] {
         assert_eq!(panic_symbols(&built(target, "push")), [""; 0], "{target}");
-        // The search finds what it looks for: a fit indexes slices.
+        // A fit indexes slices, so its image must have panics: the search for them works.
         assert!(!panic_symbols(&built(target, "fit")).is_empty(), "{target}");
     }
 }

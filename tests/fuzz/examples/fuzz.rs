@@ -1,4 +1,4 @@
-//! libFuzzer on the target that `FUZZ_TARGET` names; `tests/fuzz.sh` builds and runs it.
+//! Runs libFuzzer on the target that `FUZZ_TARGET` names; `tests/fuzz.sh` builds and runs it.
 #![no_main]
 
 use fuzz::TARGETS;

@@ -1,24 +1,24 @@
-//! The interface for C: samples, numbers, terms, a kept state and a model, all of which a caller may have wrong.
+//! The interface for C: samples, numbers, terms, a stored state and a model, each of which a caller may pass wrongly.
 
 use allan_core_c as _;
 use std::ffi::c_void;
 use std::ptr::null_mut;
 
-/// Memory that C gives for an object: of its size by `allan_core.h`, with any content.
+/// Memory for an object in C: its size is that of `allan_core.h`, its content arbitrary.
 #[repr(C, align(8))]
 struct Memory<const BYTES: usize>([u8; BYTES]);
 
 type Estimator = Memory<3592>;
 type Curve = Memory<2720>;
-/// `allan_model`: three words before eight terms.
+/// Memory of an `allan_model`: three words before eight terms.
 type Model = Memory<{ 24 + 8 * TERM }>;
-/// `allan_trace_result`: two models, a number, and five added terms of four words.
+/// Memory of an `allan_trace_result`: two models, a number, and five added terms of four words.
 type Traced = Memory<{ 2 * (24 + 8 * TERM) + 8 + 5 * 32 }>;
 /// Bytes of an `allan_term`: two words of 32 bits, and nine numbers.
 const TERM: usize = 80;
-/// `ALLAN_24_8_SAVED_SIZE`
+/// Bytes of a saved state, `ALLAN_24_8_SAVED_SIZE`.
 const SAVED: usize = 4500;
-/// `ALLAN_ERROR_INTERNAL`
+/// Status of a panic, `ALLAN_ERROR_INTERNAL`.
 const INTERNAL: i32 = 11;
 
 unsafe extern "C" {
@@ -44,12 +44,12 @@ unsafe extern "C" {
     fn allan_count(value: f64, origin: f64, lsb: f64, count: *mut i32) -> i32;
 }
 
-/// Ends a trace after the baseline.
+/// Cancels a trace after the baseline.
 unsafe extern "C" fn stop(_: *mut c_void) -> bool {
     false
 }
 
-/// The next bytes as an array; zeros after the last.
+/// The next bytes as an array, filled with zeros after the last byte.
 fn next<const BYTES: usize>(bytes: &mut &[u8]) -> [u8; BYTES] {
     let mut array = [0; BYTES];
     let (first, rest) = bytes.split_at(bytes.len().min(BYTES));
@@ -58,7 +58,7 @@ fn next<const BYTES: usize>(bytes: &mut &[u8]) -> [u8; BYTES] {
     array
 }
 
-/// No call panics, whatever it is given, and a state that was saved is that which is restored.
+/// No call panics for any arguments, and a restored state equals the saved one.
 pub(crate) fn calls(mut bytes: &[u8]) {
     let bytes = &mut bytes;
     let [sample_period, lsb, value] = [(); 3].map(|()| f64::from_le_bytes(next(bytes)));
@@ -66,7 +66,7 @@ pub(crate) fn calls(mut bytes: &[u8]) {
     let terms: Vec<Memory<TERM>> = (0..terms % 10).map(|_| Memory(next(bytes))).collect();
     let samples: Vec<i32> = (0..samples).map(|_| i32::from_le_bytes(next(bytes))).collect();
     let mut model = Memory(next(bytes));
-    // No estimator: it lacks the mark of one.
+    // This memory is not an estimator, since it lacks the mark of one.
     let mut estimator: Estimator = Memory([0xAA; _]);
     let (mut curve, mut count): (Curve, i32) = (Memory([0xAA; _]), 0);
     let mut traced = Memory([0; _]);
@@ -89,7 +89,7 @@ pub(crate) fn calls(mut bytes: &[u8]) {
         status(allan_24_8_restore(&raw mut other, bytes.as_ptr(), bytes.len()));
         assert_eq!(allan_24_8_restore(&raw mut other, saved.as_ptr(), length), 0);
         assert_eq!(allan_24_8_len(&raw const other), 2 * samples.len() as u64);
-        // A byte that changed is noticed.
+        // A changed byte must be detected.
         saved[usize::from(missing) % length] ^= 1;
         assert_ne!(allan_24_8_restore(&raw mut other, saved.as_ptr(), length), 0);
         status(allan_24_8_merge(&raw mut estimator, &raw const other));

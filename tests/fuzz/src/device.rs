@@ -4,7 +4,7 @@ use link::{BootCause, Decoder, Message, Received};
 use simulation::Device;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// Whatever the port receives, the device goes on: it sends whole frames, and has not crashed.
+/// The device continues after any bytes at its port: it sends undamaged frames and has not crashed.
 pub(crate) fn commands(bytes: &[u8]) {
     let part = VirtualAdis16405::new(NoiseModel::paper(), 1);
     let mut device = Device::new(part, Device::blank_memory()).with_restarts();

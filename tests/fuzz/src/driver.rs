@@ -1,11 +1,11 @@
-//! The driver, with any answers of the bus.
+//! The driver with arbitrary answers of the bus.
 
 use adis16405_driver::{Adis16405, AlarmNumber, Burst, BurstValidator, Config, Stimulus};
 use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-/// Answers with these bytes, then with 0xFF.
+/// A bus that answers with these bytes, then with 0xFF.
 struct Answers<'a>(core::slice::Iter<'a, u8>);
 
 impl ErrorType for Answers<'_> {
@@ -29,12 +29,13 @@ impl DelayNs for NoDelay {
     fn delay_ns(&mut self, _: u32) {}
 }
 
-/// Every procedure ends, whatever the sensor answers; the first byte chooses the procedure, the others are the answers.
+/// Every procedure ends for any answers of the sensor. The first byte selects the procedure; the others are the
+/// answers.
 pub(crate) fn answers_of_the_bus(bytes: &[u8]) {
     let Some((&choice, answers)) = bytes.split_first() else { return };
     let mut imu = Adis16405::new(Answers(answers.iter()), NoDelay, Config::default());
     let mut validator = BurstValidator::default();
-    // Any result is right.
+    // Any result is acceptable.
     let _result = match choice % 12 {
         0 => imu.init().is_ok(),
         1 => imu.software_reset().is_ok(),

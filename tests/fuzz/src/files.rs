@@ -13,7 +13,7 @@ use std::io::Write;
 
 const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 12, rows_with_losses: 1 << 14, most_lost: 0.25 };
 
-/// A file with these bytes is read as every command reads it.
+/// Reads these bytes as a file, in the way of every command.
 pub(crate) fn recording(bytes: &[u8]) {
     let mut file = tempfile::NamedTempFile::new().expect("a file");
     file.write_all(bytes).expect("room");
@@ -46,7 +46,7 @@ fn read_to_its_end(mut stream: SampleStream) {
     let _any = stream.read(drop);
 }
 
-/// A text that is taken for a report can be exported, or is refused, in every format.
+/// A text that is accepted as a report can be exported or is refused, in every format.
 pub(crate) fn report(bytes: &[u8]) {
     let Ok(text) = core::str::from_utf8(bytes) else { return };
     let Ok(report) = SavedReport::from_json(text) else { return };

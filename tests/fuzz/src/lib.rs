@@ -1,5 +1,5 @@
-//! Readers of bytes that someone else has written, each as a function of these bytes that has to return: it panics where a promise is
-//! broken. `tests/corpus.rs` calls them with the bytes that are kept in `corpus`; the example `fuzz` has libFuzzer look for others.
+//! Readers of untrusted bytes, each as a function of the bytes. The function must return; it panics if a guarantee is broken.
+//! `tests/corpus.rs` calls them with the bytes in `corpus`, and the example `fuzz` lets libFuzzer search for others.
 
 mod c_interface;
 mod device;
@@ -8,7 +8,7 @@ mod files;
 mod serial_line;
 mod state;
 
-/// A target and its name, which is that of its folder in `corpus`.
+/// The name of a target, which is also its folder in `corpus`, and its function.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.

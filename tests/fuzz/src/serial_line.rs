@@ -2,8 +2,8 @@
 
 use link::{Decoder, Encoder, Received};
 
-/// Whatever arrives, a message that was taken is one that could have been sent: encoded again it is received again, with the same content;
-/// and every byte is a frame's, a line's, or was discarded.
+/// A received message must be one that a device could have sent: encoded again, it is received with the same content. Every byte belongs to
+/// a frame or a line, or is counted as discarded.
 pub(crate) fn stream(bytes: &[u8]) {
     let (mut decoder, mut encoder) = (Decoder::new(), Encoder::new());
     for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
@@ -15,7 +15,7 @@ pub(crate) fn stream(bytes: &[u8]) {
         let [Received::Message { message: again, .. }] = received.as_slice() else {
             panic!("{message:?}: {received:?}")
         };
-        // By their text: a number that is none is not equal to itself.
+        // Texts are compared, since NaN is not equal to itself.
         assert_eq!(format!("{again:?}"), format!("{message:?}"));
     }
 }

@@ -1,11 +1,11 @@
-//! Records that are kept and read back: the state of estimators, and the settings in flash memory.
+//! Stored records: the state of estimators, and the settings in flash memory.
 
 use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use firmware::settings_store::{MAX_RECORD, SettingsStore};
 use std::convert::Infallible;
 
-/// A state that is taken can be used and kept again.
+/// An accepted state can be used and stored again.
 pub(crate) fn estimators(bytes: &[u8]) {
     if let Ok(mut cascade) = postcard::from_bytes::<Cascade<12, 8>>(bytes) {
         let kept = postcard::to_stdvec(&cascade).expect("room");
@@ -59,7 +59,7 @@ impl NorFlash for Flash {
     }
 }
 
-/// Whatever a flash memory holds, it is read, and a record that is written then is what is read.
+/// Any content of the flash memory can be read, and a record that is written afterwards is read back.
 pub(crate) fn settings(bytes: &[u8]) {
     let mut contents = vec![0xFF; 2 * SECTOR];
     // Both sectors begin with bytes of the fuzzer.

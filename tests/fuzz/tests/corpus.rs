@@ -1,4 +1,4 @@
-//! The bytes that are kept of the search by libFuzzer: those of `corpus`, which reach most of each reader, and each that was a finding.
+//! Runs the targets on the bytes in `corpus`: those that reach most of each reader, and those of all findings of libFuzzer.
 
 use fuzz::TARGETS;
 use std::fs;

@@ -1,4 +1,4 @@
-//! Counts the instructions and the stack of every call whose documentation has a table of its costs, and prints them over
+//! Counts the instructions and the stack of every call whose documentation has a table of costs, and prints them over
 //! semihosting, one per line: `call NAME METRIC NUMBER`.
 #![no_std]
 #![no_main]
@@ -19,7 +19,7 @@ use emulator::{instructions, stack_bytes};
 
 const OCTAVES: usize = 24;
 const SAMPLES: usize = 4_000;
-/// Number of estimators whose next call is the one that is counted.
+/// Number of estimators whose next call is counted.
 const COPIES: usize = 50;
 
 type Estimator = Cascade<OCTAVES, 8>;
@@ -36,7 +36,7 @@ fn main() -> ! {
     emulator::success()
 }
 
-/// Noise with a standard deviation of 20 counts, as that of a gyro at rest.
+/// Noise with a standard deviation of 20 counts, like that of a gyro at rest.
 fn noise() -> [i32; SAMPLES] {
     let mut state = 1_u64;
     let mut uniform = || {
@@ -46,7 +46,7 @@ fn noise() -> [i32; SAMPLES] {
     core::array::from_fn(|_| uniform() + uniform() + uniform())
 }
 
-/// Prints the instructions of a call, `times` of which `work` makes.
+/// Prints the instructions of one call; `work` makes `times` calls.
 fn count(name: &str, metric: &str, times: usize, work: impl FnOnce()) {
     hprintln!("call {} {} {}", name, metric, instructions(work) / times as u64);
 }
@@ -80,8 +80,8 @@ fn sample_by_sample() {
     black_box(&late);
 }
 
-/// Counts calls on estimators all of whose octaves are due with the next sample, with differences of more than 16 bits. An
-/// estimator of 24 octaves bridges gaps of at most 2²⁰ samples.
+/// Counts calls on estimators for which the next sample is due in all octaves, with differences of more than 16 bits.
+/// An estimator of 24 octaves bridges gaps of at most 2²⁰ samples.
 fn longest_samples() {
     const SAMPLE: i32 = 1 << 23;
     let mut estimators = black_box([const { Estimator::new() }; COPIES]);
@@ -112,7 +112,7 @@ fn longest_samples() {
     black_box(&estimators);
 }
 
-/// Counts calls on an estimator as a whole.
+/// Counts calls that act on a whole estimator.
 fn whole_estimators() {
     let mut estimator = black_box(late_state::after_constant::<OCTAVES, 8>(0, 1 << 24));
     noise().iter().for_each(|&sample| estimator.push(sample));
@@ -120,7 +120,7 @@ fn whole_estimators() {
     let mut copy = || black_box(&estimator).snapshot_into(black_box(&mut snapshot));
     count("Cascade::snapshot_into", "average", 10, || (0..10).for_each(|_| copy()));
     stack("Cascade::snapshot_into", copy);
-    // In place, so that the curve itself is not part of the stack.
+    // The curve exists before the call, so that it is not part of the measured stack.
     let mut curve = Curve::empty();
     let sums = |octave: usize| -> OctaveSums { estimator.octave_sums(octave).unwrap_or_default() };
     let mut rebuild = || Estimator::rebuild_curve(black_box(&mut curve), 0.01, estimator.len(), sums);
@@ -161,7 +161,7 @@ fn serialised() {
     assert!(other == estimator);
 }
 
-/// Counts what the estimators that read the sums of one channel, or of two for the coupling, add to a sample.
+/// Counts the instructions per sample of estimators that use the sums of one channel, or of two for the coupling.
 fn other_estimators() {
     let samples = noise();
     let mut coupling = black_box(Coupling::<OCTAVES>::new());
@@ -179,7 +179,7 @@ fn other_estimators() {
     stack("Coupling::observe", || coupling.observe(black_box(&last), black_box(&last)));
     stack("Hadamard::observe", || hadamard.observe(black_box(&last)));
     stack("FractionalOctaves::observe", || fractional.observe(black_box(&last)));
-    // Each of them has seen a difference at every octave now.
+    // Each estimator has now had a difference in every octave.
     measure("Coupling::points", &mut || _ = black_box(black_box(&coupling).points()));
     measure("Hadamard::points", &mut || _ = black_box(black_box(&hadamard).points(&last, 0.01)));
     measure("FractionalOctaves::curve", &mut || {
@@ -198,8 +198,8 @@ fn observed(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Estimator, &Estim
     })
 }
 
-/// Counts fits of 20 points, those of an hour and a half at 204.8 samples a second: white noise and a random walk that
-/// are equal at n = 2¹⁰, with deviations as large as those of a measured curve.
+/// Counts fits of 20 points, as of an hour and a half at 204.8 samples a second. White noise and a random walk are
+/// equal at n = 2¹⁰, and the points scatter as those of a measured curve.
 fn fits() {
     const SAMPLES: u64 = 1 << 21;
     let mut state = 1_u64;
@@ -216,7 +216,7 @@ fn fits() {
     });
     measure("fit::fit", &mut || model = black_box(fit(black_box(&curve), &NoiseTerm::BASELINE)));
     measure("fit::fit_power_laws", &mut || _ = black_box(fit_power_laws(black_box(&curve), &NoiseTerm::BASELINE)));
-    // A time constant of 100 s to start with.
+    // The fit starts with a time constant of 100 s.
     let shapes = [NoiseTerm::AngleRandomWalk, NoiseTerm::Markov(Markov { time_constant: 100.0 })];
     measure("fit::fit_shapes", &mut || _ = black_box(fit_shapes(black_box(&curve), &shapes)));
     measure("fit::goodness", &mut || _ = black_box(goodness(black_box(&curve), &model)));

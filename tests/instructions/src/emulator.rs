@@ -1,7 +1,7 @@
 //! The emulated board: its clock, which counts instructions, and the end of a run, which QEMU returns as its exit
 //! status.
 //!
-//! With QEMU's `-icount shift=0` an instruction takes 1 ns, and SysTick counts at 25 MHz: a tick is 40 instructions.
+//! QEMU's `-icount shift=0` makes an instruction take 1 ns. SysTick counts at 25 MHz, so a tick is 40 instructions.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::syst::SystClkSource;
@@ -13,9 +13,9 @@ use cortex_m_semihosting::hprintln;
 
 const INSTRUCTIONS_PER_TICK: u64 = 40;
 const WRAP: u32 = 1 << 24;
-/// Value of a word of stack that has not been used.
+/// Value of an unused word of stack.
 const PAINT: u32 = 0xCCCC_CCCC;
-/// Bytes of stack that are painted: more than anything here uses, and far from the data at the other end of the board's
+/// Bytes of stack that are painted: more than any call here uses, and far from the data at the other end of the board's
 /// 4 MB.
 const PAINTED_BYTES: u32 = 64 * 1024;
 
@@ -27,7 +27,7 @@ fn SysTick() {
     WRAPS.store(WRAPS.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
 }
 
-/// Starts the clock; to be called once.
+/// Starts the clock. To be called once.
 pub(crate) fn start() {
     let mut timer = Peripherals::take().expect("taken once").SYST;
     timer.set_clock_source(SystClkSource::Core);
@@ -48,14 +48,14 @@ fn ticks() -> u64 {
     }
 }
 
-/// Number of instructions that `work` takes.
+/// Number of instructions of `work`.
 pub(crate) fn instructions(work: impl FnOnce()) -> u64 {
     let start = ticks();
     work();
     (ticks() - start) * INSTRUCTIONS_PER_TICK
 }
 
-/// Bytes of stack that `work` uses below its caller's, interrupts included: the stack is painted before and searched
+/// Bytes of stack that `work` uses below its caller's, including interrupts. The stack is painted before and searched
 /// after.
 #[inline(never)]
 pub(crate) fn stack_bytes(work: impl FnOnce()) -> u32 {

@@ -1,4 +1,4 @@
-//! Instructions of the estimator, on average and at most, and of the estimators that read its sums.
+//! Average and largest instructions of the estimator, and of the estimators that use its sums.
 
 use crate::emulator::instructions;
 use crate::late_state;
@@ -11,7 +11,7 @@ const SAMPLES: usize = 4_000;
 /// Number of estimators whose next push is the longest one.
 const WORST: usize = 100;
 
-/// Noise with a standard deviation of 20 counts, as that of a gyro at rest, times a factor.
+/// Noise with a standard deviation of 20 counts, like that of a gyro at rest, times `factor`.
 fn noise(factor: i32) -> [i32; SAMPLES] {
     let mut state = 1_u64;
     let mut uniform = || {
@@ -61,8 +61,8 @@ fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
     black_box(&cascade);
 }
 
-/// Counts samples of which every hundredth is missing, and the longest sample after a gap: one at which every line takes
-/// part, with differences of more than 16 bits. An estimator of 24 octaves bridges gaps of at most 2²⁰ samples.
+/// Counts samples of which every hundredth is missing, and the longest sample after a gap, for which every line
+/// changes, with differences of more than 16 bits. An estimator of 24 octaves bridges gaps of at most 2²⁰ samples.
 fn gaps(name: &str, samples: &[i32; SAMPLES]) {
     let mut cascade = black_box(late_state::after_constant::<OCTAVES, 8>(0, 1 << 20));
     samples.iter().for_each(|&sample| cascade.push(sample));
@@ -96,7 +96,7 @@ fn worst<const OVERLAP: usize>(name: &str) {
 
 type Channel = Cascade<OCTAVES, 8>;
 
-/// Counts what the estimators that read the sums of one channel, or of two for the coupling, add to a sample.
+/// Counts the instructions per sample of estimators that use the sums of one channel, or of two for the coupling.
 fn additional_estimators(samples: &[i32; SAMPLES]) {
     let mut coupling = black_box(Coupling::<OCTAVES>::new());
     let mut hadamard = black_box(Hadamard::<OCTAVES, 8>::new());
@@ -122,7 +122,7 @@ fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Channel, &Channel)) ->
     })
 }
 
-/// Prints how many instructions each of the `times` runs in `work` took on average.
+/// Prints the average instructions of a run; `work` makes `times` runs.
 fn report(name: &str, times: u32, work: impl FnOnce()) {
     let tenths = instructions(work) / u64::from(black_box(times) / 10);
     hprintln!("count {} {}.{}", name, tenths / 10, tenths % 10);

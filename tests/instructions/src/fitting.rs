@@ -15,10 +15,10 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 
 const OCTAVES: usize = 24;
-/// An hour and a half at 204.8 samples a second: 20 points.
+/// Samples of a record of an hour and a half at 204.8 samples a second, whose curve has 20 points.
 const SAMPLES: u32 = 1 << 20;
 const SAMPLE_PERIOD: f64 = 1.0 / 204.8;
-/// The filters that the trace tries, which are those of the firmware.
+/// The filters that the trace tries, as in the firmware.
 const FILTERS: [MovingAverageFilter; 10] = [
     MovingAverageFilter::bartlett(2),
     MovingAverageFilter::bartlett(4),
@@ -31,7 +31,7 @@ const FILTERS: [MovingAverageFilter; 10] = [
     MovingAverageFilter { stages: 2, taps: 8, decimation: 10.1 },
     MovingAverageFilter { stages: 2, taps: 8, decimation: 12.1 },
 ];
-/// The pairs of a channel and two covariates.
+/// The pairs of a channel and two covariates, by index.
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 /// The curve of a gyro at rest with white noise, a random walk, and a square wave of 0.5 s with the amplitude `tone`.
 fn record(tone: i32) -> Curve<OCTAVES> {
@@ -59,7 +59,7 @@ fn main() -> ! {
     measure("fit", || model = black_box(fit(&quiet, &NoiseTerm::BASELINE)));
     measure("fit_power_laws", || _ = black_box(fit_power_laws(&quiet, &NoiseTerm::BASELINE)));
     measure("goodness", || _ = black_box(goodness(&quiet, &model)));
-    // The result lies outside the stack that is measured, as in the firmware.
+    // The result is outside of the measured stack, as in the firmware.
     let mut result = Trace::empty();
     let mut traced = |curve| {
         result.fit_baseline(curve);

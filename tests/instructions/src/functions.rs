@@ -1,4 +1,4 @@
-//! The functions of libm and micromath: instructions, and the bits of their results, which the host compares.
+//! The functions of libm and micromath: instructions, and the bits of their results, which the host checks.
 
 use crate::emulator::instructions;
 use core::hint::black_box;
@@ -8,7 +8,7 @@ use micromath::F32Ext;
 const VALUES: usize = 64;
 
 pub(crate) fn count() {
-    // Ranges of the arguments in the estimator, the intervals and the fit.
+    // The ranges are those of the arguments in the estimator, the intervals and the fit.
     let ratios = |k: f64| libm::exp2(k / 4.0 - 8.0); // 2⁻⁸ … 2⁸
     let exponents = |k: f64| k / 2.0 - 24.0; // −24 … 8
     let signed = |k: f64| k / 10.0 - 3.2; // ±3.2
@@ -23,7 +23,7 @@ pub(crate) fn count() {
     compare("ln_gamma", shapes, libm::lgamma, None);
 }
 
-/// Prints the result of each library for each argument, and the instructions that a call took on average.
+/// Prints the result of each library for each argument, and the average instructions of a call.
 fn compare(name: &str, argument: impl Fn(f64) -> f64, exact: fn(f64) -> f64, coarse: Option<fn(f32) -> f32>) {
     let arguments: [f64; VALUES] = core::array::from_fn(|k| argument(k as f64));
     let mut answers = arguments;

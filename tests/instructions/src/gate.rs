@@ -1,4 +1,4 @@
-//! Instructions of the firmware's gate against gross errors, for each sample of a channel.
+//! Instructions of the firmware's gate against gross errors, per sample and channel.
 
 use crate::channels::{CHANNELS, ChannelSet};
 use crate::emulator::instructions;
@@ -6,12 +6,12 @@ use crate::gross_error_gate::GrossErrorGate;
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 
-/// Samples of noise, which are repeated.
+/// Number of noise samples, which are repeated.
 const NOISE: usize = 64;
-/// Sixteen blocks, with the estimate of the noise at the end of each.
+/// Repetitions for sixteen blocks, each of which ends with an estimate of the noise.
 const REPETITIONS: usize = 16 * 256 / NOISE;
 
-/// Counts samples of noise, of which one in 64 is missing in each channel.
+/// Counts samples of noise; each channel lacks one in 64.
 pub(crate) fn count() {
     let mut gate = black_box(<GrossErrorGate>::new());
     let mut state = 1_u64;
@@ -28,7 +28,7 @@ pub(crate) fn count() {
             black_box(gate.find(counts, *refused));
         }
     };
-    run(); // the noise is known
+    run(); // the gate learns the noise
     let tenths = 10 * instructions(run) / (REPETITIONS * NOISE * CHANNELS.len()) as u64;
     hprintln!("count gate {}.{}", tenths / 10, tenths % 10);
 }

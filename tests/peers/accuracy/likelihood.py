@@ -1,10 +1,10 @@
-"""The Gaussian likelihood of the series by exact covariances, for the program in src/: what an estimate can reach.
+"""The Gaussian likelihood of the series by exact covariances, for the program in src/: the smallest error of any estimate.
 
-Reads and answers as peers.py does, and needs numpy and scipy alone. The likelihood is that of the means of 1,000 blocks, of the
-contrasts of the 20 parts of each block, and of the squares within the parts. The first differences of the means are stationary for
-white noise, flicker noise and random walks alike, so their covariance is exact, and so is that of the contrasts of a block. Contrasts of
-different blocks and the squares are taken as independent, as white noise is nearly all of them. By its information
-(`errors`) B of S2 has an error of 8.9 %; the series itself allows 8.6 %.
+Reads and answers as peers.py does, and needs only numpy and scipy. The statistics of the likelihood are the means of 1,000 blocks, the
+contrasts of the 20 parts of each block, and the squares within the parts. The first differences of the means are stationary for white
+noise, flicker noise and random walks, so their covariance is exact; the covariance of the contrasts of a block is exact too. Contrasts
+of different blocks and the squares are treated as independent, since they consist almost entirely of white noise. By the information of
+this likelihood (`errors`) B of S2 has an error of 8.9 %; the whole series allows 8.6 %.
 """
 
 import json
@@ -32,12 +32,12 @@ def second_integral(name, x):
 
 
 def scale(name, duration):
-    """What a coefficient of 1 adds to the variance of means over this duration, in s, in the unit of `second_integral`."""
+    """Variance that a coefficient of 1 adds to means over this duration in s, in the unit of `second_integral`."""
     return {"white": 1 / duration, "flicker": 1.0, "walk": duration}[name]
 
 
 def covariances(name, lags, duration):
-    """Covariances of means over a duration at these lags, up to a constant that no difference sees."""
+    """Covariances of means over a duration at these lags, up to a constant that cancels in every difference."""
     integral = second_integral(name, lags + 1) - 2 * second_integral(name, lags) + second_integral(name, lags - 1)
     return scale(name, duration) * integral
 
@@ -51,8 +51,8 @@ def of_differences(name, count, duration):
 def halves(count):
     """Orthonormal bases of the vectors that stay the same when reversed, and of those that change sign.
 
-    A symmetric Toeplitz matrix reversed is itself, so the parts of a stationary vector in the two bases are independent. Two covariance
-    matrices of half the size take a quarter of the time of one.
+    A symmetric Toeplitz matrix equals itself with rows and columns reversed, so the components of a stationary vector in the two bases
+    are independent. Two covariance matrices of half the size take a quarter of the time of one.
     """
     identity = np.eye(count)
     middle = count // 2
@@ -74,7 +74,7 @@ class Normal:
         self.matrices, self.repeats = matrices, repeats
 
     def score_and_information(self, squares, products):
-        """Of the logarithm of the likelihood, by the squares of the coefficients."""
+        """Gradient and information of the logarithm of the likelihood in the squares of the coefficients."""
         factor = cho_factor(sum(square * matrix for square, matrix in zip(squares, self.matrices)), lower=True)
         inverse = [cho_solve(factor, matrix) for matrix in self.matrices]
         excess = cho_solve(factor, products) - np.eye(len(products))
@@ -84,7 +84,7 @@ class Normal:
 
 
 class Likelihood:
-    """The likelihood of a series of so many samples with these noises."""
+    """The likelihood of a series of this number of samples with these noises."""
 
     def __init__(self, samples, names):
         self.parts_s = PERIOD_S * samples / BLOCKS / PARTS
@@ -110,7 +110,7 @@ class Likelihood:
         contrasts = parts @ self.contrasts.T
         statistics = [np.outer(half @ differences, half @ differences) for half in self.halves]
         statistics += [contrasts.T @ contrasts / BLOCKS, np.array([[variance]])]
-        # White noise explains the squares within the parts, and each other noise an equal part of the differences.
+        # The start: white noise explains the squares within the parts, and each other noise an equal share of the differences.
         squares = np.array([np.var(differences) / matrix[0, 0] for matrix in self.differences]) / len(self.differences)
         squares[0] = variance / self.groups[-1].matrices[0][0, 0]
         least = 1e-9 * squares

@@ -19,7 +19,7 @@ NAMES = ["white", "flicker", "walk"]
 
 
 def nmayorov(batch, effects):
-    """allan-variance: overlapping, non-negative least squares of the relative error."""
+    """The method of allan-variance: a non-negative least-squares fit of the relative error of the overlapping curve."""
     tau, avar = compute_avar(batch, dt=1.0 / RATE_HZ)
     parameters, _ = estimate_parameters(tau, avar, effects=effects)
     return [
@@ -30,11 +30,11 @@ def nmayorov(batch, effects):
 
 def ros(batch):
     """The procedure of allan_variance_ros: slopes at 1 s and 3 s; the minimum of the curve for the bias instability."""
-    # Whole tenths of a second: `arange(0.1, 1000, 0.1)` lands beside them, and a bin can lose a sample.
+    # The times are whole tenths of a second. `arange(0.1, 1000, 0.1)` misses them by rounding, so a bin could lose a sample.
     tenths = np.arange(1, 10_000)
     periods = tenths / 10
     with contextlib.redirect_stderr(io.StringIO()):
-        # Half a sample on top, so that truncation to whole samples cannot lose one.
+        # Half a sample is added, so that truncation to whole samples cannot lose one.
         deviations = np.sqrt(compute_allan_variances(batch, periods + 0.5 / RATE_HZ, RATE_HZ, overlap=0))
     breakpoint_ = int(np.where(periods == 10)[0][0])
     result = []

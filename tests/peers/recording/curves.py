@@ -1,4 +1,4 @@
-"""The overlapping Allan deviation of every column of a table by pandas and allantools, at octaves: what a script does."""
+"""Computes the overlapping Allan deviation of every column of a table at octaves with pandas and allantools, as a user's script does."""
 
 import sys
 

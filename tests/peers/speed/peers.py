@@ -1,4 +1,4 @@
-"""Nanoseconds a sample of allantools.oadev with octave factors, on white noise; the least of several runs."""
+"""Prints the time of allantools.oadev per sample at octave factors, ns, on white noise: the shortest of several runs."""
 
 import time
 

@@ -1,10 +1,10 @@
-//! The checks, applied to small crates with and without what they must find.
+//! Applies the checks to small crates with and without violations.
 
 use super::modules::Crate;
 use super::{Package, circles, describe_circles, describe_dependencies, describe_double_names};
 use std::path::Path;
 
-/// Writes a crate from pairs of a file's name in `src` and its text, and reads it.
+/// Writes a crate from pairs of a file name in `src` and its text, and reads it.
 fn with_crate<T>(files: &[(&str, &str)], inspect: impl FnOnce(&Crate, &Path) -> T) -> T {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {

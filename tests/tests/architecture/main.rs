@@ -1,5 +1,5 @@
-//! The architecture of the workspace: crates depend on those that a table allows, modules form no circle, and no two
-//! public types have the same name; tests reach the measured recordings through one function.
+//! The architecture of the workspace. Crates have only the dependencies of a table, modules form no cycle, and no two
+//! public types have the same name. Tests access the measured recordings by one function.
 //!
 //! `WORKSPACE_ROOT` names another checkout to check.
 
@@ -13,14 +13,13 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Each crate with the crates of the workspace that it may depend on. Dependencies for tests alone are free.
+/// The crates of the workspace on which each crate may depend. Dependencies of tests are not restricted.
 ///
-/// The driver and `allan-core` know neither each other nor the rest. `readers` know files and neither the driver nor statistics, `time-base`
-/// knows stamps and no files; `recordings` adds what is the ADIS16405's own. `measurement` is what `recordings` hands to
-/// `noise-analysis`: so recordings contain no statistics, and the analysis no file, driver, firmware or virtual sensor.
-/// `measurement` needs `allan-core` only for the description of a sensor's filters. The virtual sensor is written from
-/// the data sheet alone, so that it can check the driver. Reports are made of findings: those of `noise-analysis` and
-/// the models of `allan-core` in them. Nothing depends on the benchmarks.
+/// The driver and `allan-core` depend on no other crate of the workspace. `readers` handle files without the driver and without statistics;
+/// `time-base` handles time stamps without files; `recordings` adds the formats of the ADIS16405. `measurement` is the interface from
+/// `recordings` to `noise-analysis`, so recordings have no statistics, and the analysis has no file, driver, firmware or virtual sensor.
+/// `measurement` needs `allan-core` only to describe a sensor's filters. The virtual sensor is written from the data sheet alone, so that
+/// it can check the driver. Reports contain findings of `noise-analysis` with models of `allan-core`. No crate depends on the benchmarks.
 #[rustfmt::skip]
 const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("adis16405-driver", ""),
@@ -58,9 +57,9 @@ const RECORDINGS: &str = concat!("ADIS_", "RECORDINGS");
 
 struct Package {
     name: String,
-    /// Crates of the workspace that it depends on, except for tests and build scripts.
+    /// Crates of the workspace on which the crate depends, without those of tests and build scripts.
     dependencies: Vec<String>,
-    /// Root files of its library and of its programs.
+    /// Root files of the library and of the programs.
     roots: Vec<PathBuf>,
 }
 
@@ -95,7 +94,7 @@ fn packages() -> Vec<Package> {
     list(&metadata["packages"]).into_iter().map(package).collect()
 }
 
-/// Sets of files each of which uses every other one of its set, directly or through further files.
+/// Cycles: sets of files each of which uses every other one of its set, directly or through further files.
 fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     let reached = |from: &Path| {
         let mut reached = BTreeSet::new();
@@ -115,7 +114,7 @@ fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     circles.into_iter().collect()
 }
 
-/// The uses between the modules of each folder, where a module includes those below it.
+/// The uses between the modules of each folder; a module includes those below it.
 fn between_modules(uses: &Uses) -> Uses {
     let mut between = Uses::new();
     for (file, used) in uses {
@@ -131,7 +130,7 @@ fn between_modules(uses: &Uses) -> Uses {
     between
 }
 
-/// The circles of files, and those of modules of several files each, with the names by which each uses the next.
+/// The cycles of files, and those of modules of several files, with the names by which each uses the next.
 fn describe_circles(uses: &Uses, root: &Path) -> String {
     let between = between_modules(uses);
     let of_files = circles(uses);
@@ -155,8 +154,8 @@ fn describe_circles(uses: &Uses, root: &Path) -> String {
     text
 }
 
-/// Sources of the repository, in Rust or Python, that read the variable `ADIS_RECORDINGS`, but for the function that skips a
-/// test where a recording is absent.
+/// Sources of the repository, in Rust or Python, that read the variable `ADIS_RECORDINGS`, without the function that
+/// skips a test if a recording is absent.
 fn readers_of_recordings(root: &Path) -> Vec<String> {
     let output = Command::new("git").args(["ls-files", "-z", "--", "*.rs", "*.py"]).current_dir(root).output();
     let output = output.expect("git starts");
@@ -194,7 +193,7 @@ fn describe_dependencies(packages: &[Package]) -> String {
     text
 }
 
-/// Files of a crate's folder `tests` that its one program of tests, `suite.rs`, does not name: their tests would not run.
+/// Files of a crate's folder `tests` that `suite.rs`, its one test program, does not name. Their tests would not run.
 fn files_outside_of_the_suite(folder: &Path) -> Vec<PathBuf> {
     let Ok(suite) = std::fs::read_to_string(folder.join("suite.rs")) else { return vec![] };
     let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
@@ -234,7 +233,7 @@ fn no_modules_of_a_crate_use_each_other_in_a_circle() {
 #[test]
 fn no_two_public_types_of_the_workspace_share_a_name() {
     let roots = packages().into_iter().flat_map(|package| package.roots);
-    // A file that two crates include has its types once.
+    // The types of a file that two crates include are counted once.
     let types: BTreeSet<(String, PathBuf)> = roots
         .flat_map(|file| Crate::read(&file).public_types)
         .map(|(name, file)| (name, file.canonicalize().expect("a file")))

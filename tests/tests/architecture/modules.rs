@@ -1,7 +1,7 @@
-//! Reads the modules of a crate from its source files, and lists which file uses the items of which other file.
+//! Reads the modules of a crate from its source files, and lists the files whose items each file uses.
 //!
-//! A name is followed through `use` and `pub use` to the file that defines it. A re-export does not count as a use. Items
-//! with `#[cfg(test)]` or `#[cfg(doc)]` are left out; any other `cfg` is taken as true.
+//! A name is followed through `use` and `pub use` to the file that defines it. A re-export does not count as a use.
+//! Items with `#[cfg(test)]` or `#[cfg(doc)]` are left out; any other `cfg` counts as true.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use quote::ToTokens;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use syn::visit::Visit;
 use syn::{Expr, ExprLit, Item, ItemMod, ItemUse, Lit, Meta, UseTree, Visibility};
 
-/// By file: the files that it uses, and by which names.
+/// For each file the files that it uses, with the names that it uses.
 pub(crate) type Uses = BTreeMap<PathBuf, BTreeMap<PathBuf, BTreeSet<String>>>;
 
 #[derive(Default)]
@@ -34,7 +34,7 @@ struct Module {
 /// Names that the `use` declarations of a module import.
 #[derive(Default)]
 struct Imports {
-    /// By name: the path that it stands for.
+    /// The path of each imported name.
     names: HashMap<String, Vec<String>>,
     /// Paths of `use path::*`.
     globs: Vec<Vec<String>>,
@@ -116,7 +116,7 @@ impl Crate {
         }
     }
 
-    /// Which file uses which other one.
+    /// The uses between the files of the crate.
     pub(crate) fn uses(&self) -> Uses {
         let mut uses = Uses::new();
         for (index, module) in self.modules.iter().enumerate() {
@@ -125,7 +125,7 @@ impl Crate {
                 let definer = &self.modules[definer].file;
                 if *definer != module.file {
                     let names = uses.entry(module.file.clone()).or_default().entry(definer.clone()).or_default();
-                    // For `Type::function`, the name of the type.
+                    // For `Type::function` this is the name of the type.
                     let name = path.iter().find(|name| name.starts_with(char::is_uppercase)).or(path.last());
                     names.extend(name.cloned());
                 }
@@ -134,8 +134,8 @@ impl Crate {
         uses
     }
 
-    /// Follows a path that is written in a module; `goes_on` is true for the beginning of a longer path. `None` for items
-    /// of other crates.
+    /// Follows a path written in a module; `goes_on` is true for the beginning of a longer path. `None` for items of
+    /// other crates.
     fn resolve(&self, index: usize, path: &[String], goes_on: bool, depth: usize) -> Option<Target> {
         let (first, rest) = path.split_first()?;
         let mut target = match first.as_str() {
@@ -152,7 +152,7 @@ impl Crate {
                 name => match self.find(module, name, goes_on || k + 1 < rest.len(), depth) {
                     Some(found) => found,
                     None if self.modules[module].imports.names.contains_key(name) => return None,
-                    // Defined by a macro.
+                    // The item is defined by a macro.
                     None => Target::ItemIn(module),
                 },
             };

@@ -20,7 +20,7 @@ use std::time::Duration;
 use system_tests::{FlightLog, pseudo_terminals};
 use tempfile::TempDir;
 
-/// A kind of attack: its name, and how it is run.
+/// A kind of attack: its name and its function.
 type Kind = (&'static str, fn(&mut Campaign, &mut ChaCha8Rng));
 
 pub(crate) const KINDS: [Kind; 13] = [
@@ -39,7 +39,7 @@ pub(crate) const KINDS: [Kind; 13] = [
     ("pseudo-terminals", terminal),
 ];
 
-/// Share of the intervals that hold the true value.
+/// Fraction of the intervals that contain the true value.
 const COVERAGE: f64 = 0.95;
 
 /// Findings of a campaign.
@@ -49,7 +49,7 @@ pub(crate) struct Campaign {
     kind: &'static str,
     runs: BTreeMap<&'static str, u64>,
     faults: Vec<String>,
-    /// Intervals of N in clean records, and how many of them hold the true value.
+    /// Number of intervals of N in clean records, and how many of them contain the true value.
     intervals: u64,
     held: u64,
 }
@@ -88,7 +88,7 @@ impl Campaign {
         }
     }
 
-    /// Runs the program on so many bytes, and checks what every run owes.
+    /// Runs the program on `bytes` bytes of input, and checks the properties of every run.
     fn checked(&mut self, program: &Program, codes: &[i32], bytes: u64) -> Run {
         let run = program.run();
         self.check(&run, &program.arguments.join(" "), codes, bytes);
@@ -103,7 +103,7 @@ impl Campaign {
         }
     }
 
-    /// The report of a run, if it has one, whose figures have to agree.
+    /// The report of a run, if it has one; its figures must be consistent.
     fn report(&mut self, run: &Run) -> Option<Value> {
         if run.code != Some(0) {
             return None;
@@ -121,7 +121,7 @@ impl Campaign {
         Some(report)
     }
 
-    /// Analyses a file, whatever it is.
+    /// Analyses any file.
     fn analyse(&mut self, recorded: &Recorded) -> Option<Value> {
         let file = self.write(recorded.name, &recorded.bytes);
         let folder = self.folder().to_owned();
@@ -135,7 +135,7 @@ impl Campaign {
         let mut faults = self.faults.clone();
         let count = self.intervals as f64;
         let share = self.held as f64 / count;
-        // Three standard deviations of a binomial share.
+        // The tolerance is three standard deviations of a binomial fraction.
         let most = 3.0 * (COVERAGE * (1.0 - COVERAGE) / count).sqrt();
         if self.intervals > 0 && (share - COVERAGE).abs() > most {
             faults.push(format!("{} of {} intervals hold the true value", self.held, self.intervals));
@@ -167,7 +167,7 @@ fn drawn(rng: &mut ChaCha8Rng, lost: f64) -> (Noise, Recorded) {
     (noise, recorded)
 }
 
-/// White noise in any format, with losses and without: the report has what was written.
+/// White noise in any format, with and without losses: the report must have the noise, rate and losses.
 fn clean_record(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(4000..12_000);
     let lost = [0.0, 0.0, 0.01, 0.05][rng.random_range(0..4)];
@@ -185,7 +185,7 @@ fn clean_record(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.require(report["samples"] == noise.kept.len() as u64, format!("{name}: samples {}", report["samples"]));
     campaign
         .require(report["dropped"]["gap"] == noise.missing(), format!("{name}: missing {}", report["dropped"]["gap"]));
-    // Stamps are whole microseconds.
+    // Time stamps are whole microseconds.
     let rate = report["sample_rate_hz"].as_f64().unwrap_or(f64::NAN) / noise.rate_hz;
     campaign.require((rate - 1.0).abs() < 1e-5, format!("{name}: {rate} of the rate"));
     for channel in report["channels"].as_array().into_iter().flatten() {
@@ -198,13 +198,13 @@ fn clean_record(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Bytes of any format that are cut off, flipped, replaced, inserted or exchanged; also compressed afterwards.
+/// Bytes of any format are cut off, flipped, replaced, inserted or exchanged; the file may be compressed afterwards.
 fn mutated_bytes(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let (_, mut recorded) = drawn(rng, 0.01);
     let bytes = &mut recorded.bytes;
     for _ in 0..1 << rng.random_range(0..6) {
         let length = bytes.len().max(1);
-        // Lengths and types are in the headers.
+        // Headers have the lengths and types.
         let end = if rng.random() { length.min(400) } else { length };
         let at = rng.random_range(0..end);
         match rng.random_range(0..6) {
@@ -230,11 +230,11 @@ fn mutated_bytes(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.analyse(&recorded);
     let file = campaign.write(recorded.name, &recorded.bytes);
     let folder = campaign.folder().to_owned();
-    // `inspect` too refuses a file that is no recording.
+    // `inspect` must also refuse a file that is not a recording.
     campaign.checked(&Program::new(&folder, &["inspect", &file]), &[0, 1], recorded.bytes.len() as u64);
 }
 
-/// Fields that a number may not be.
+/// Fields that are not valid numbers.
 const FIELDS: [&str; 24] = [
     "",
     "nan",
@@ -262,7 +262,7 @@ const FIELDS: [&str; 24] = [
     "\0",
 ];
 
-/// Lines of text that are lost, doubled, exchanged or joined, and fields that are no numbers.
+/// Lines of text are lost, doubled, exchanged or joined, and fields are not numbers.
 fn mutated_lines(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(200..3000);
     let noise = Noise::draw(rng, rows, 0.01);
@@ -270,7 +270,7 @@ fn mutated_lines(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let text = String::from_utf8(recorded.bytes).expect("text");
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for _ in 0..1 << rng.random_range(0..8) {
-        // The first lines say what the others are.
+        // The first lines define the others.
         let end = if rng.random_range(0..3) == 0 { lines.len().min(4) } else { lines.len() };
         let at = rng.random_range(0..end);
         match rng.random_range(0..6) {
@@ -301,7 +301,7 @@ fn mutated_lines(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.analyse(&recorded);
 }
 
-/// Clocks that step, wander, go back, repeat, are coarse, or begin anywhere.
+/// Clocks have steps, wander, go back, repeat, are coarse, or begin at any time.
 fn clock(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(1000..8000);
     let noise = Noise::draw(rng, rows, 0.0);
@@ -334,7 +334,7 @@ fn clock(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.analyse(&recorded);
 }
 
-/// Losses of any pattern by an index: each is counted.
+/// Losses have any pattern by an index; each must be counted.
 fn losses(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(2000..8000);
     let mut noise = Noise::draw(rng, rows, 0.0);
@@ -359,7 +359,7 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().expect("memory")
 }
 
-/// A small file that becomes a large one.
+/// A small file expands to a large one.
 fn bomb(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let filled = [0u8, b'\n', b'1', b'0'][rng.random_range(0..4)];
     let mib = rng.random_range(20..200usize);
@@ -370,7 +370,7 @@ fn bomb(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
         let mut element = Vec::new();
         let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
         let rows = (content.len() / 3) as u32;
-        // Flags, dimensions, name and numbers of an array of int8 (MAT-File Format, chapter 1).
+        // The words are flags, dimensions, name and numbers of an array of int8 (MAT-File Format, chapter 1).
         element.extend(words(&[14, 3 * rows + 56, 6, 8, 8, 0, 5, 8, rows, 3, 1 | 4 << 16]));
         element.extend(b"gyro");
         element.extend(words(&[1, 3 * rows]));
@@ -400,7 +400,7 @@ fn bomb(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Structures in structures, definitions that use each other, and lists without an end.
+/// Structures are nested, definitions use each other, and lists have no end.
 fn nested(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let levels = 1usize << rng.random_range(3..15);
     let header = |descr: &str| {
@@ -426,7 +426,7 @@ fn nested(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
             ("nested.ulg", log.0)
         }
         _ => {
-            // Each definition has two of the next.
+            // Each definition uses the next one twice.
             let text: String = (0..levels.min(200))
                 .map(|level| format!("\n====\nMSG: p/A{level}\np/A{0} a\np/A{0} b\n", level + 1))
                 .collect();
@@ -520,7 +520,7 @@ const VALUES: [&str; 28] = [
     "table",
 ];
 
-/// Any words in any order.
+/// The arguments are any words in any order.
 fn arguments(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(100..1500);
     let noise = Noise::draw(rng, rows, 0.0);
@@ -532,7 +532,7 @@ fn arguments(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     for _ in 0..8 {
         let mut words = vec![*COMMANDS.choose(rng).expect("a command")];
         if matches!(words[0], "simulate" | "demo") {
-            // Nothing is simulated for an hour.
+            // A simulation must not run for an hour.
             words = if words[0] == "simulate" {
                 vec!["simulate", "out/s.csv", "--seconds", "2"]
             } else {
@@ -545,7 +545,7 @@ fn arguments(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
         }
         campaign.checked(&Program::new(&folder, &words), &[0, 1, 2], 0);
         let now = std::fs::read(folder.join("clean.csv")).unwrap_or_default();
-        // A second file name of `convert` or `simulate` is what they write.
+        // The second file name of `convert` or `simulate` is their output.
         let is_output =
             words[1..].contains(&"clean.csv") && matches!(words[0], "convert" | "simulate" | "export" | "uf2");
         campaign.require(now == content || is_output, format!("an input was changed by {}", words.join(" ")));
@@ -553,7 +553,7 @@ fn arguments(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// A report whose values are replaced: what reads it refuses it or writes finite numbers.
+/// The values of a report are replaced. Its readers must refuse it or write finite numbers.
 fn mutated_report(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(1000..3000);
     let noise = Noise::draw(rng, rows, 0.0);
@@ -619,7 +619,7 @@ fn mutate(value: &mut Value, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Counts replayed over the bus give the same report; so do those that were converted, and those in a shorter analysis the same N.
+/// Counts replayed over the bus give the same report, and so do converted ones. The quick analysis gives the same N.
 fn replay_and_conversion(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(1000..4000);
     let noise = Noise::draw(rng, rows, 0.01);
@@ -656,7 +656,7 @@ fn replay_and_conversion(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// A disk on which only so much can be written: the old file stays, or the new one is whole.
+/// Only some of a file fits on the disk: the old file stays, or the new one is complete.
 fn full_disk(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let rows = rng.random_range(1000..4000);
     let noise = Noise::draw(rng, rows, 0.0);
@@ -684,7 +684,7 @@ fn full_disk(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.require(now == expected, format!("{} bytes after {}", now.len(), words.join(" ")));
 }
 
-/// A signal at any time: the old file stays, or the new one is whole; and nothing is left beside it.
+/// A signal comes at any time: the old file stays, or the new one is complete, and no other file remains.
 fn interrupted(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let noise = Noise::draw(rng, 60_000, 0.0);
     let recorded = noise.recorded("counts.csv");
@@ -701,7 +701,7 @@ fn interrupted(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let child = program.start();
     thread::sleep(Duration::from_millis(rng.random_range(0..400)));
     let signal = ["INT", "TERM", "HUP"][rng.random_range(0..3)];
-    // The process may have ended.
+    // The process may already have ended.
     let _ = Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).output();
     let run = Run::of(child);
     let now = std::fs::read(&out).unwrap_or_default();
@@ -716,7 +716,7 @@ fn interrupted(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.require(others.is_empty(), format!("SIG{signal} leaves {others:?}"));
 }
 
-/// A port on which anything comes: garbage, halves of messages, floods, silence.
+/// Any bytes come from the port: garbage, parts of messages, floods, silence.
 fn terminal(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let (near, far, port) = pseudo_terminals(Duration::from_millis(5));
     let folder = campaign.folder().to_owned();
@@ -743,7 +743,7 @@ fn terminal(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     });
     let run = Run::of(child);
     campaign.check(&run, &words.join(" "), &[0, 1], 0);
-    // A write that waits for room, which nobody makes any more, ends with the last end of the port.
+    // A write that waits for room ends when the last end of the port is closed.
     drop(far);
     sender.join().expect("a sender");
 }

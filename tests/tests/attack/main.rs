@@ -1,10 +1,10 @@
-//! An attack on the program: inputs that are drawn at random, and what every run owes whatever its input is.
+//! An attack on the program: random inputs, and the properties of every run for any input.
 //!
-//! A run ends in one clear error or in a report whose figures agree, with an exit code of its own, without a panic, within 20 s of processor
-//! time and, for a file below 1 MB, 500 MB of memory. Records of white noise have the noise, the rate and the losses that they were written
-//! with, in every format, and 95 % of the intervals hold the true value.
+//! A run ends with one clear error or with a report whose figures are consistent, with a defined exit code, without a panic, and within 20
+//! s of processor time. For a file below 1 MB it uses at most 500 MB of memory. Reports of white noise have the noise, rate and losses of
+//! the record in every format, and 95 % of the intervals contain the true value.
 //!
-//! Case `n` is drawn from seed `n` alone. A failure names its case; `ATTACK_CASE=n` runs it alone.
+//! Case `n` is drawn from seed `n` alone. A failure names its case; `ATTACK_CASE=n` runs only that case.
 
 mod cases;
 mod program;
@@ -13,9 +13,9 @@ mod report;
 
 use self::cases::Campaign;
 
-/// Cases of the short form, four of each kind: about 30 s.
+/// Number of cases of the short form, four of each kind: about 30 s.
 const FEW: u64 = 4 * cases::KINDS.len() as u64;
-/// Cases of the long form: about an hour.
+/// Number of cases of the long form: about an hour.
 const MANY: u64 = 4_550;
 
 fn attack(test: &str, cases: impl Iterator<Item = u64>) {

@@ -1,23 +1,23 @@
-//! Runs the program within the bounds that it has to keep, and checks what every run owes.
+//! Runs the program within its limits, and checks the properties of every run.
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
-/// Bounds for an input below 1 MB: seconds of processor time, MB of memory.
+/// Limits for an input below 1 MB: seconds of processor time, MB of memory.
 const MOST_SECONDS: u32 = 20;
 const MOST_MB: u64 = 500;
-/// Bytes of input up to which they hold.
+/// Largest input for which the limits apply, bytes.
 const SMALL: u64 = 1_000_000;
-/// Between two looks at the memory of a run.
+/// Time between two readings of the memory of a run.
 const LOOK: Duration = Duration::from_millis(3);
-/// A run that uses no processor time and does not end.
+/// Time after which a run counts as hanging, also if it uses no processor time.
 const MOST_WAIT: Duration = Duration::from_secs(120);
 
 /// Result of a run.
 pub(crate) struct Run {
-    /// `None` where a signal ended it.
+    /// Exit code; `None` if a signal ended the run.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: Vec<u8>,
     pub(crate) errors: String,
@@ -30,7 +30,7 @@ pub(crate) struct Program<'a> {
     pub(crate) arguments: Vec<String>,
     /// A file for standard input.
     pub(crate) input: Option<&'a Path>,
-    /// Blocks of 512 bytes to which a file may grow, as on a full disk.
+    /// Size limit of a file in blocks of 512 bytes, as on a full disk.
     pub(crate) most_blocks: Option<u32>,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Program<'a> {
         Self { folder, arguments, input: None, most_blocks: None }
     }
 
-    /// Starts it in its folder, under limits of the system for processor time and files.
+    /// Starts the program in its folder, under limits of the system for processor time and files.
     pub(crate) fn start(&self) -> Child {
         let disk = self.most_blocks.map_or_else(String::new, |blocks| format!("trap '' XFSZ; ulimit -f {blocks}; "));
         let script = format!("{disk}ulimit -t {MOST_SECONDS}; exec \"$@\"");
@@ -83,7 +83,7 @@ impl Run {
         Self { code: status.code(), stdout, errors: String::from_utf8_lossy(&stderr).into_owned(), peak_mb }
     }
 
-    /// Fault of a run on so many bytes of input, whose exit codes may be `codes`.
+    /// The fault of a run on `bytes` bytes of input, if any; its exit code must be one of `codes`.
     pub(crate) fn fault(&self, codes: &[i32], bytes: u64) -> Option<String> {
         let Some(code) = self.code else { return Some("a signal ended it: no end within its bounds".to_owned()) };
         if !codes.contains(&code) {
@@ -100,7 +100,8 @@ impl Run {
         match (code, lines.as_slice()) {
             (0, []) | (2, [_, ..]) => None,
             (0, _) => Some("messages of a run that succeeds".to_owned()),
-            // One line, or the table of columns and a command; without a known column the options that say which is which.
+            // An error has one line; or it is followed by the table of columns and a command, or, without a known
+            // column, by the options that assign columns.
             (_, [error, rest @ ..])
                 if error.starts_with("error: ")
                     && error.len() < 2000
@@ -116,17 +117,17 @@ impl Run {
     }
 }
 
-/// All that comes through a pipe.
+/// Reads everything that comes through a pipe.
 fn drained(mut pipe: impl std::io::Read + Send + 'static) -> thread::JoinHandle<Vec<u8>> {
     thread::spawn(move || {
         let mut all = Vec::new();
-        // The end of the process ends the pipe.
+        // The pipe ends with the process.
         let _ = pipe.read_to_end(&mut all);
         all
     })
 }
 
-/// The most memory of a process until now, MB.
+/// The largest memory of a process so far, MB.
 fn peak(status_file: &str) -> u64 {
     let text = std::fs::read_to_string(status_file).unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));

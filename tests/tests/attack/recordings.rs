@@ -1,4 +1,4 @@
-//! Recordings of white noise whose truth is known, in every format that is written here: the clean ones, and what the others are made from.
+//! Recordings of white noise with known truth, in every format: the clean ones, and the base of the damaged ones.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Write as _};
 use system_tests::FlightLog;
 
-/// Names of the files that the noise is written to; the first ones are text.
+/// Names of the files in which the noise is written; the first ones are text.
 pub(crate) const FORMS: [&str; 12] = [
     "counts.csv",
     "units.csv",
@@ -21,7 +21,7 @@ pub(crate) const FORMS: [&str; 12] = [
     "log.bin",
     "bag.mcap",
 ];
-/// How many of them are text.
+/// Number of names that are text.
 pub(crate) const TEXTS: usize = 7;
 
 /// White noise of three rates.
@@ -29,14 +29,14 @@ pub(crate) struct Noise {
     pub(crate) rate_hz: f64,
     /// Numbers of the samples that arrived.
     pub(crate) kept: Vec<u64>,
-    /// In counts of [`LSB`](Self::LSB), a row for each of them.
+    /// A row of counts of [`LSB`](Self::LSB) for each of these samples.
     pub(crate) counts: Vec<[i16; 3]>,
     /// Standard deviation, deg/s.
     pub(crate) sigma: f64,
 }
 
 impl Noise {
-    /// deg/s a count; also of the register counts of an ADIS16405.
+    /// Size of a count, deg/s; also of the register counts of an ADIS16405.
     pub(crate) const LSB: f64 = 0.05;
 
     pub(crate) fn draw(rng: &mut ChaCha8Rng, rows: usize, lost: f64) -> Self {
@@ -56,7 +56,7 @@ impl Noise {
         Self { rate_hz, kept, counts, sigma: deviation * Self::LSB }
     }
 
-    /// Samples that never arrived between the first and the last.
+    /// Samples missing between the first and the last.
     pub(crate) fn missing(&self) -> u64 {
         self.kept.last().map_or(0, |last| last + 1 - self.kept.len() as u64)
     }
@@ -74,12 +74,12 @@ impl Noise {
         self.kept.iter().map(|&sample| 1_000_000 + (sample as f64 * 1e6 / self.rate_hz).round() as u64)
     }
 
-    /// In any of the [forms](FORMS).
+    /// The recording in a random one of the [forms](FORMS).
     pub(crate) fn drawn(&self, rng: &mut ChaCha8Rng) -> Recorded {
         self.recorded(FORMS[rng.random_range(0..FORMS.len())])
     }
 
-    /// In the form whose file has this name.
+    /// The recording in the form with this file name.
     pub(crate) fn recorded(&self, name: &'static str) -> Recorded {
         const TEXT: &str = "time=0,gyro_x=1,gyro_y=2,gyro_z=3";
         let rate = self.rate_hz.to_string();
@@ -139,13 +139,13 @@ impl Noise {
         Recorded { name, bytes, options }
     }
 
-    /// A heading, if there is one, and a line for each sample.
+    /// A heading, if any, and a line for each sample.
     fn text(&self, heading: &str, line: impl Fn(usize) -> String) -> Vec<u8> {
         let heading = if heading.is_empty() { String::new() } else { format!("{heading}\n") };
         (heading + &(0..self.kept.len()).map(|at| line(at) + "\n").collect::<String>()).into_bytes()
     }
 
-    /// Times in µs and rates in rad/s, as `numpy.save` writes doubles (NEP 1).
+    /// Times in µs and rates in rad/s in the format of `numpy.save` for doubles (NEP 1).
     fn npy(&self) -> Vec<u8> {
         let shape = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 4), }}", self.kept.len());
         let mut bytes = b"\x93NUMPY\x01\0\x76\0".to_vec();
@@ -157,7 +157,7 @@ impl Noise {
         bytes
     }
 
-    /// `sensor_gyro` of PX4, in rad/s (ULog file format).
+    /// A log of PX4 with `sensor_gyro`, in rad/s (ULog file format).
     fn ulog(&self) -> Vec<u8> {
         let mut log = FlightLog::empty();
         log.add(b'B', &[0; 40]);
@@ -177,7 +177,7 @@ impl Noise {
         log.0
     }
 
-    /// Messages `IMU` of ArduPilot, in rad/s.
+    /// A log of ArduPilot with messages `IMU`, in rad/s.
     fn dataflash(&self) -> Vec<u8> {
         const MAGIC: [u8; 2] = [0xA3, 0x95];
         fn padded(text: &str, size: usize) -> impl Iterator<Item = u8> {
@@ -201,7 +201,7 @@ impl Noise {
         log
     }
 
-    /// A message of a type of its own in CDR, in rad/s.
+    /// A file with messages of a new type in CDR, in rad/s.
     fn mcap(&self) -> Vec<u8> {
         let definition = "builtin_interfaces/Time stamp\ngeometry_msgs/Vector3 angular_velocity\n\
             ================================================================================\n\
@@ -231,7 +231,7 @@ impl Noise {
     }
 }
 
-/// A file, and the options with which it is read.
+/// The bytes of a file, and the options for reading it.
 pub(crate) struct Recorded {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,

@@ -1,4 +1,4 @@
-//! Figures of a report that say the same thing twice have to agree.
+//! Checks that figures which a report states twice are consistent.
 
 use serde_json::Value;
 
@@ -25,7 +25,7 @@ pub(crate) fn contradiction(report: &Value) -> Option<String> {
     outside_of_its_bounds(report, "report")
 }
 
-/// An estimate that does not lie between its own bounds, or bounds that are exchanged.
+/// The first estimate outside of its own bounds, or with exchanged bounds.
 fn outside_of_its_bounds(value: &Value, path: &str) -> Option<String> {
     match value {
         Value::Array(values) => {

@@ -7,13 +7,13 @@ use system_tests::Image;
 
 pub(crate) use system_tests::stm32f4::{TARGET, h405_image as image, run};
 
-/// The image for the Adafruit Feather STM32F405, built at most once a run.
+/// The image for the Adafruit Feather STM32F405, built at most once per run.
 pub(crate) fn feather_image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
     IMAGE.get_or_init(|| Image::of_board("feather", TARGET, &[]))
 }
 
-/// Asserts that a quarter of the stack was never used, and prints the figure.
+/// Asserts that at least a quarter of the stack was never used, and prints the figure.
 pub(crate) fn assert_stack_suffices(health: &Health) {
     let Health { stack_bytes, stack_size, .. } = *health;
     let free_percent = 100 * (stack_size - stack_bytes) / stack_size;

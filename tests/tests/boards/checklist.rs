@@ -1,4 +1,4 @@
-//! `bench`, the command of the host, on the emulated boards: its steps are typed one after the other, and every check passes.
+//! The host's command `bench` on the emulated boards: its steps are typed one after the other, and every check must pass.
 
 use super::bench::{feather_image, run};
 use emulation::{FEATHER, Outcome, Scenario, Sensor};
@@ -8,12 +8,12 @@ use system_tests::stm32f4::Typed;
 
 const PLAN: BenchPlan = BenchPlan { reads: 10_000, noise_s: 1.5, bursts_s: 2.0 };
 
-/// The steps as they are typed on a board whose report takes `report_s`.
+/// The typed steps for a board whose report takes `report_s`.
 fn typed(report_s: f64) -> Typed {
     Typed::nothing().then_steps(PLAN.steps().into_iter().map(|step| (step.command, step.seconds)), report_s)
 }
 
-/// Asserts that every check passes, of what a port has sent, each byte with its time in ns.
+/// Asserts that every check passes for what a port has sent, bytes with their times in ns.
 fn assert_passes(typed: &Typed, received: &[(u64, u8)]) {
     let (mut decoder, mut transcript) = (Decoder::new(), Transcript::default());
     for (step, (_, answer)) in PLAN.steps().iter().zip(typed.answers(received)) {
@@ -25,7 +25,7 @@ fn assert_passes(typed: &Typed, received: &[(u64, u8)]) {
     write_table(&checks, &mut table).expect("memory");
     println!("{}", String::from_utf8(table).expect("text"));
     for check in &checks {
-        // One port, and so no second one.
+        // There is one port, so the check of a second port is not run.
         assert!(check.cause.is_none() && (!check.measured.is_empty() || check.name == "second port"), "{check:?}");
     }
     assert!(checks.len() >= 20, "{}", checks.len());

@@ -1,4 +1,4 @@
-//! Learning on the device: the model of one epoch is fitted, its covariates are subtracted, and the next epoch shows
+//! Learning on the device. The model of one epoch is fitted, its covariates are subtracted, and the next epoch shows
 //! the drift with and without the subtraction.
 
 use super::bench::{assert_stack_suffices, feather_image, image, run};
@@ -16,23 +16,23 @@ use std::path::Path;
 
 /// The results of two epochs.
 struct Epochs {
-    /// Models of the first, one per channel.
+    /// Models of the first epoch, one per channel.
     learned: Vec<LearnedMessage>,
-    /// Their validation on the second, one per channel.
+    /// Validations of these models on the second epoch, one per channel.
     validated: Vec<ValidationMessage>,
-    /// Time that the fit of all channels took, s.
+    /// Duration of the fits of all channels, s.
     fit_s: f64,
     /// Longest time between the models of two channels, s.
     longest_channel_s: f64,
     /// Time from a key press during the fit to the answer, s.
     response_s: f64,
-    /// K of accelerometer x in the report of the first, g/√s.
+    /// K of accelerometer x in the report of the first epoch, g/√s.
     random_walk: f64,
-    /// The table of what was learned.
+    /// The table of the findings.
     table: Vec<String>,
 }
 
-/// Times of two epochs, s: when the table of what was learned is asked for, and the end.
+/// Times of two epochs, s: the request for the table of findings, and the end.
 #[derive(Clone, Copy)]
 struct Plan {
     table_s: f64,
@@ -41,9 +41,11 @@ struct Plan {
 
 /// The models of the first epoch are fitted within 45 s, and validated as soon as the second one ends.
 const FIRST_FIT: Plan = Plan { table_s: 2.0 * EPOCH_S - 3.0, end_s: 2.0 * EPOCH_S + 4.0 };
-/// With two terms beyond N, B and K in every channel a fit takes twice as long. The second one is awaited too.
+/// With two terms beyond N, B and K in every channel a fit takes twice as long. This plan also waits for the second
+/// fit.
 const BOTH_FITS: Plan = Plan { table_s: 2.0 * EPOCH_S + 90.0, end_s: 2.0 * EPOCH_S + 93.0 };
-/// A time within the self-test, which follows the start-up of 290 ms and the configuration: the bus is idle from 371 ms on.
+/// A time within the self-test. The self-test follows the start-up of 290 ms and the configuration, and the bus is idle
+/// from 371 ms on.
 const SELF_TEST_S: f64 = 0.376;
 
 fn run_two_epochs(
@@ -58,7 +60,7 @@ fn run_two_epochs(
         (0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()),
         (PRESSED_S, b"v".to_vec()),
         (table_s, b"t".to_vec()),
-        // No third epoch, during whose fit the table would wait.
+        // There is no third epoch, since the table would wait during its fit.
         (2.0 * EPOCH_S + 10.0, b"e 3600\r".to_vec()),
     ];
     keys.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -70,7 +72,7 @@ fn run_two_epochs(
     let decoded = Decoded::decode(&received);
     assert_eq!((decoded.counters.missing, decoded.counters.bad_frames), (0, 0), "{:?}", decoded.counters);
 
-    // No sample was lost during the fit.
+    // No sample may be lost during the fit.
     let health = **decoded.healths().first().expect("the first epoch's report");
     assert_eq!((health.used, health.queue_full, health.lost_edges), (health.bursts, 0, 0), "{health:?}");
     assert_stack_suffices(&health);
@@ -95,15 +97,15 @@ fn run_two_epochs(
     Epochs { learned, validated, fit_s, longest_channel_s, response_s, random_walk, table: decoded.lines }
 }
 
-/// The reset comes while the models are fitted to the finished epoch. Afterwards all of them are fitted, as without a reset,
-/// and of the running epoch no more is lost than the second since its last checkpoint.
+/// The reset comes while models are fitted to the finished epoch. Afterwards all models are fitted, as without a reset.
+/// The running epoch loses at most the second since its last checkpoint.
 #[test]
 fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
     const SHORT_EPOCH_S: f64 = 12.0;
     const RESET_S: f64 = SHORT_EPOCH_S + 3.0;
     let keys = vec![
         (0.5, format!("i 0\re {SHORT_EPOCH_S}\r").into_bytes()),
-        // No second epoch.
+        // There is no second epoch.
         (RESET_S + 2.0, b"\re 3600\r".to_vec()),
         (RESET_S + 12.0, b"s".to_vec()),
     ];
@@ -120,7 +122,7 @@ fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
         learned.filter_map(|m| if let Message::Learned(m) = m { Some(m.clone()) } else { None }).collect()
     };
     assert!(learned(&before).len() < 6, "the reset came too late");
-    // The epoch was finished, and its rate measured, before the reset.
+    // The epoch was finished before the reset, and its rate measured.
     let rates: Vec<Option<f64>> = before.hellos().iter().map(|hello| hello.measured_rate_hz).collect();
     assert_eq!(learned(&after), learned_on_host(&bursts, &samples, &rates).0, "bit for bit");
 
@@ -130,9 +132,9 @@ fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
     assert!((13.3..15.1).contains(&sampled_s), "{sampled_s} s of samples");
 }
 
-/// Four effects at once, each undeclared to the firmware: a temperature effect, a Gauss-Markov process, a line and steps. Names,
-/// parameters and the errors before and after on the next epoch are those of the host on the same samples, bit for bit, and the table
-/// says them in words. A channel without a covariate is not changed.
+/// The sensor has four effects that are not declared to the firmware: a temperature effect, a Gauss-Markov process, a line and steps.
+/// Names, parameters, and the errors before and after on the next epoch equal those of the host for the same samples, bit for bit. The
+/// table states them in words. A channel without a covariate is not changed.
 #[test]
 fn hidden_effects_are_learned_and_subtracted() {
     let Epochs { learned, validated, fit_s, longest_channel_s, response_s, random_walk, table } =
@@ -159,14 +161,14 @@ fn hidden_effects_are_learned_and_subtracted() {
     for ReportedDeviations { n, raw, compensated } in &validated[0].drift {
         println!("second epoch, at {:5.1} s: {raw:.4} -> {compensated:.4} deg/s", *n as f64 / RATE_HZ);
     }
-    // A cycle of amplitude A and period T has σ = A·sin²(πτ/T)/(πτ/T): 0.095 deg/s at 10 s. The noise of the gyro has
+    // A cycle of amplitude A and period T has σ = A·sin²(πτ/T)/(πτ/T): 0.095 deg/s at 10 s. The noise of the gyro is
     // √(0.0368²/10 + (0.664·0.0093)² + 0.0013²·10/3) = 0.0134 deg/s, up to 50 % more with 8 degrees of freedom. An
-    // error of the sensitivity within its interval, 10 % of it, leaves 0.010 deg/s: together less than 0.025.
+    // error of the sensitivity within its interval, 10 %, leaves 0.010 deg/s. Together this is less than 0.025.
     let ten = validated[0].drift.iter().find(|drift| drift.n == 2048).expect("10 s of 60");
     assert!((ten.raw / 0.095 - 1.0).abs() < 0.25, "{ten:?}");
     assert!(ten.compensated < 0.025 && ten.raw > 3.0 * ten.compensated, "{ten:?}");
 
-    // The models of gyro y and gyro z fail on the next epoch without their terms, and do not with them.
+    // The models of gyro y and gyro z fail on the next epoch without their terms, and succeed with them.
     for (index, terms) in [(1, &[ReportedTerm::Markov][..]), (2, &[ReportedTerm::Sinusoid, ReportedTerm::Resonance])] {
         let [added] = &learned[index].added_terms[..] else { panic!("{:?}", learned[index]) };
         assert!(terms.contains(&added.coefficient.term), "{added:?}");
@@ -176,18 +178,18 @@ fn hidden_effects_are_learned_and_subtracted() {
     let ReportedParameter { value, low, high } = learned[2].added_terms[0].shape[0];
     println!("gyro z has a line at {value:.2} Hz ({low:.2} to {high:.2}), truth {LINE_HZ}");
     assert!((value / LINE_HZ - 1.0).abs() < 0.1, "a curve of octaves locates a line to 10 %: {:?}", learned[2]);
-    // A curve does not tell a step from a random walk: one of size D in an epoch of length L has σ² = D²τ/(3·(L − 2τ)), and
-    // K²τ/3 with K = D/√L up to √3 times that, the value at τ = L/3.
+    // A curve does not distinguish a step from a random walk. A step of size D in an epoch of length L has σ² =
+    // D²τ/(3·(L − 2τ)); K²τ/3 with K = D/√L is up to √3 times smaller, at τ = L/3.
     println!("accl x: K {:.1} mg/√s", 1e3 * random_walk);
     let expected = STEP_G / EPOCH_S.sqrt();
     assert!((0.9 * expected..3.0_f64.sqrt() * expected).contains(&random_walk), "{random_walk}, {expected}");
 }
 
-/// The sensor's filter at another setting, undeclared to the firmware: sixteen taps a stage (SENS_AVG, lower byte), written by
-/// something else while the self-test runs, after the firmware has set none and before it samples. On the other board.
+/// The sensor's filter is at another setting than the firmware knows: sixteen taps a stage (SENS_AVG, lower byte). Another device writes it
+/// during the self-test, after the firmware has set no filter and before it samples. This is the other board.
 #[test]
 #[ignore = "long: two epochs and twice the fits take a minute; run with --long"]
-fn another_filter_is_found() {
+fn a_filter_that_another_device_has_changed_is_found() {
     let filter = vec![(SELF_TEST_S, Event::WriteRegister(0xB804))];
     let Epochs { learned, validated, table, .. } =
         run_two_epochs(feather_image(), FEATHER, Sensor::Warming, filter, BOTH_FITS);

@@ -1,11 +1,11 @@
-//! The cost of an image: one row a board; each test of a board prints all rows that are there.
+//! The costs of the images, one row per board. Each board's test prints all rows measured so far.
 
 use super::images;
 use link::Health;
 use std::path::Path;
 use system_tests::image_folder;
 
-/// The sizes of a board's memory in bytes: flash, and RAM beside the stack.
+/// The memory of a board in bytes: flash, and RAM without the stack.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Memory {
     pub(crate) flash: u32,
@@ -18,16 +18,16 @@ pub(crate) struct Costs<'a> {
     pub(crate) memory: Memory,
     pub(crate) image: &'a Path,
     pub(crate) core_mhz: f64,
-    /// Share of the time that the processor was awake while it sampled at 819.2 SPS and did nothing else, in percent.
+    /// Percentage of the time that the processor was awake while it only sampled at 819.2 SPS.
     pub(crate) awake_percent: f64,
-    /// The report at the end of an epoch, after its models were learned.
+    /// The health message at the end of an epoch, after its models were learned.
     pub(crate) health: Health,
 }
 
 const HEAD: &str = "board                    flash            RAM, static      stack, deepest   free   processor  longest interrupt: sampling, estimators";
 
-/// Asserts the budgets: a quarter of the flash, three quarters of the RAM, three quarters of the stack, a quarter of the
-/// processor, and 20 us for a sampling interrupt. Prints the table of all boards that were measured so far.
+/// Asserts the budgets: a quarter of the flash, three quarters of the RAM, three quarters of the stack, a quarter of
+/// the processor, and 20 us for a sampling interrupt. Prints the table of all boards measured so far.
 pub(crate) fn assert_within_budget(costs: &Costs<'_>) {
     let Costs { board, memory, image, core_mhz, awake_percent, health } = *costs;
     let size = images::size(image);

@@ -1,4 +1,4 @@
-//! The output of an image, decoded by the host's decoder, and the report that the host computes from the same bursts.
+//! The output of an image, decoded by the host, and the report that the host computes from the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
 use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, ReportScale, Statistics, TimedBurst};
@@ -63,13 +63,13 @@ impl Decoded {
     }
 }
 
-/// The report of a channel that the firmware's estimators make on the host from the first bursts, until they have taken
-/// as many samples as `report`, which belongs to `hello`.
+/// The report of a channel by the firmware's estimators on the host. They take the first bursts until they have as many
+/// samples as `report`, which belongs to `hello`.
 pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], hello: &Hello, report: &ChannelMessage) -> ChannelMessage {
     in_stretches(&[bursts], hello, report)
 }
 
-/// [`on_host`] with bursts in several stretches; each but the first starts as the image does after a restart.
+/// [`on_host`] for bursts in several stretches; each one after the first starts as the image does after a restart.
 pub(crate) fn in_stretches(
     stretches: &[&[(u64, [u8; BURST_BYTES])]],
     hello: &Hello,

@@ -1,4 +1,4 @@
-//! Models that a device learns from epochs: the effects that are hidden from it, and the host's models of the same samples.
+//! Models that a device learns from epochs with hidden effects, and the host's models for the same samples.
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
 use emulation::RATE_HZ;
@@ -7,7 +7,7 @@ use firmware::learner::{EpochFit, validate};
 use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, Statistics, TimedBurst};
 use link::{LearnedMessage, Message, ValidationMessage};
 
-/// The table of a device that has met [`emulation::four_effects`]: for each channel one of these terms.
+/// The findings for [`emulation::four_effects`]: for each channel one of these terms.
 pub(crate) const FOUND: [(&str, &[&str]); 3] =
     [("gyro x", &["temp "]), ("gyro y", &["Gauss-Markov, "]), ("gyro z", &["sinusoid, ", "resonance, "])];
 
@@ -19,7 +19,7 @@ pub(crate) fn assert_told(lines: &[String], found: &[(&str, &[&str])]) {
     }
 }
 
-/// The models of the first epoch and their validations on the second, as the device has sent them.
+/// The models of the first epoch and their validations on the second, as sent by the device.
 pub(crate) fn learned_on_device(messages: &[Message]) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
     let (mut learned, mut validated) = (Vec::new(), Vec::new());
     for message in messages {
@@ -32,8 +32,8 @@ pub(crate) fn learned_on_device(messages: &[Message]) -> (Vec<LearnedMessage>, V
     (learned, validated)
 }
 
-/// The same messages, computed on the host from the bursts that the sensor sent. `samples` are those of one epoch or two,
-/// channel by channel, and `rates` the sample rates that the microcontroller has measured in each.
+/// The messages of [`learned_on_device`], computed on the host from the bursts of the sensor. `samples` are the numbers
+/// of samples of one epoch or two, by channel, and `rates` the sample rates measured in each.
 pub(crate) fn learned_on_host(
     bursts: &[(u64, [u8; BURST_BYTES])],
     samples: &[u64],
@@ -47,9 +47,9 @@ pub(crate) fn learned_on_host(
     let mut bursts = bursts.iter();
     let mut epochs = Vec::new();
     for ((number, samples), rate_hz) in (0..).zip(samples.chunks(CHANNELS.len())).zip(rates) {
-        // The gate may refuse a step's first sample in its channel.
+        // The gate may refuse the first sample of a step in its channel.
         let (fullest, most) = (0..).zip(samples).max_by_key(|(_, count)| **count).expect("a channel");
-        // The first bursts after the start are not used: the filter settles.
+        // The first bursts after the start are not used while the filter settles.
         while estimators.channel(fullest).is_some_and(|estimator| estimator.len() < *most)
             && let Some((sample, bytes)) = bursts.next()
         {

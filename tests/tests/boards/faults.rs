@@ -1,4 +1,4 @@
-//! Faults of the sensor, the serial line and the processor: the device recovers from each, counts it, and reports the
+//! Faults of the sensor, the serial line and the processor. The device recovers from each, counts it, and reports the
 //! cause of a restart.
 
 use super::bench::{image, run};
@@ -9,12 +9,12 @@ use emulation::{
 };
 use link::{BootCause, Health, Message};
 
-/// Upper bound on the time that a report takes.
+/// Upper bound of the duration of a report, s.
 const REPORT_S: f64 = 2.5;
-/// The sample period that is programmed: 8 ticks of 1/1638.4 s in 1/256 us.
+/// The programmed sample period: 8 ticks of 1/1638.4 s in 1/256 us.
 const PERIOD: u64 = 8 * 156_250;
 
-/// Random bytes for the serial line from a linear congruential generator (Knuth's MMIX constants).
+/// Random bytes for the serial line, from a linear congruential generator (Knuth's MMIX constants).
 fn noise(count: usize) -> Vec<u8> {
     let mut state = 1_u64;
     let mut next = || {
@@ -36,7 +36,7 @@ fn faults_of_the_sensor_and_the_line_are_recovered_from_and_counted() {
 }
 
 fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
-    /// The rate is set 0.5 s after the start, which takes 50 ms.
+    /// Time by which the rate is set: 0.5 s after the start, which takes 50 ms.
     const CONFIGURED_S: f64 = 0.55;
     let report = |at: f64| (at, b"\rr".to_vec());
     let mut keys: Vec<(f64, Vec<u8>)> = vec![(0.5, format!("i 0\rf {rate_hz}\r").into_bytes())];
@@ -58,8 +58,8 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     let scenario = Scenario { sensor, keys, events, seconds: 24.0, probe, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, log, registers, .. } = run(image(), scenario);
     assert_eq!(diagnostics, [""; 0], "neither a reset nor an access to an unmapped address");
-    // The second step of recovery resets all of the SPI through RCC, since BSY may stay set when it is disabled alone (ES0182, SPI): a
-    // register that the firmware does not use is as after a reset. Mode 3 is set again.
+    // The second step of recovery resets the whole SPI through RCC, since BSY may stay set if it is only disabled (ES0182, SPI). A register
+    // that the firmware does not use has its reset value, and mode 3 is set again.
     assert_eq!((registers[&SPI1_CRCPR], registers[&SPI1_CR1] & 0b11), (7, 0b11), "SPI1 was reset as a whole");
     let sensor = sensor.expect("a sensor");
     let decoded = Decoded::decode(&received);
@@ -70,33 +70,34 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     let [quiet, reset, low, high, lost, unplugged, .., flood] = healths[..] else { panic!("{healths:?}") };
     assert_eq!((quiet.lost_edges, quiet.suspect, quiet.recoveries), (0, 0, 0), "{quiet:?}");
 
-    // After its reset the sensor gives no edge for at least 100 ms, and is configured before its samples are used.
+    // The sensor gives no edge for at least 100 ms after its reset, and is configured before its samples are used.
     assert_eq!(reset.recoveries, 1);
     assert!(f64::from(reset.lost_edges) >= 0.1 * rate_hz, "{reset:?}");
-    // A burst that the reset cuts short is refused: its bits are shifted. The sensor reports a frame with a wrong number of clocks then.
+    // A burst that the reset cuts short is refused, since its bits are shifted. The sensor then reports a frame with a wrong number of
+    // clocks.
     assert!(reset.shifted <= 1 && reset.used + reset.shifted == reset.bursts, "{reset:?}");
     assert_eq!(reset.shifted, reset.diag_spi, "{reset:?}");
 
-    // After 16 bursts of a stuck line sampling stops, and the sensor is probed until it answers.
+    // Sampling stops after 16 bursts of a stuck line, and the sensor is probed until it answers.
     assert_eq!((low.stuck_low, low.recoveries), (16, 2), "{low:?}");
     assert_eq!((high.stuck_high, high.recoveries), (16, 3), "{high:?}");
     assert!(logs.iter().any(|log| log.contains("PROD_ID answered 0 ")) && logs.iter().any(|log| log.contains("65535")));
 
-    // Three lost edges are a gap of three samples and nothing else.
+    // Three lost edges are a gap of three samples, without further effect.
     assert_eq!((lost.lost_edges - high.lost_edges, lost.recoveries), (3, 3), "{lost:?}");
 
-    // Unplugged for 1.2 s.
+    // The sensor was unplugged for 1.2 s.
     assert_eq!(unplugged.recoveries, 4);
     assert!(f64::from(unplugged.lost_edges - lost.lost_edges) >= 1.2 * rate_hz - 1.0, "{unplugged:?}");
 
-    // 20,000 random bytes cost no sample and change no setting; lost bytes and invalid commands are counted.
+    // 20,000 random bytes cost no sample and change no setting. Lost bytes and invalid commands are counted.
     assert_eq!(flood.lost_edges, unplugged.lost_edges, "{flood:?}");
     assert!(flood.bad_commands > unplugged.bad_commands);
     assert_eq!(decoded.hellos().iter().filter(|hello| hello.sample_rate_hz != rate_hz).count(), 0);
     assert_eq!(flood.queue_full, 0);
 
     // Every sample period since the configuration is counted. A report begins with the time and ends with the counters,
-    // up to 2 s later, as the random bytes request tables too.
+    // up to 2 s later, since the random bytes also request tables.
     let health_at = decoded.messages.iter().rposition(|message| matches!(message, Message::Health(_)));
     let before = &decoded.messages[..health_at.expect("a report")];
     let hello =
@@ -111,8 +112,8 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     assert_told_to_a_probe(&log, flood);
 }
 
-/// The log that a debug probe reads has the start, what happens to the sensor and what is done about it, by names and with levels, and every
-/// counter of events that rises.
+/// The log of a debug probe has the start, the events of the sensor and the recovery steps, with names and levels, and every event counter
+/// that rises.
 fn assert_told_to_a_probe(log: &[LogLine], health: &Health) {
     println!("{log:#?}");
     let mut after = log.iter();
@@ -146,7 +147,7 @@ fn assert_told_to_a_probe(log: &[LogLine], health: &Health) {
     }
 }
 
-/// The answers to `s` and `k`, one pair after the other: lines of each `s` up to the next one.
+/// The answers to `s` and `k`, in pairs: the lines from each `s` to the next.
 fn answers(lines: &[String]) -> Vec<&[String]> {
     let starts: Vec<usize> = (0..lines.len()).filter(|&index| lines[index].starts_with("up ")).collect();
     let ends = starts.iter().skip(1).copied().chain([lines.len()]);
@@ -160,21 +161,22 @@ fn assert_lines(lines: &[String], expected: &[&str]) {
     }
 }
 
-/// Since the restart it samples, and has lost nothing.
+/// Asserts that the device has sampled since the restart without a loss.
 fn assert_sampled_since_the_start(lines: &[String]) {
     assert_lines(lines, &["sensor sampled"]);
     let counter = |name: &str| counter(lines, name).unwrap_or(0);
     assert_eq!((counter("lost_edges"), counter("recoveries")), (0, 0), "{lines:#?}");
-    // Sampling continues while the lines are printed one after the other.
+    // Sampling continues while the lines are printed.
     assert!((0..9).contains(&(counter("used") - counter("bursts"))), "{lines:#?}");
     let up_s: f64 = lines[0].split(' ').nth(1).expect("the time").parse().expect("seconds");
     let counted_s = f64::from(counter("bursts") + counter("settling")) / RATE_HZ;
-    // The time is in whole seconds. The self-test takes 48 ms at this rate: 12 ms at 819.2 SPS (data sheet Rev. B, Table 1).
+    // The time is in whole seconds. The self-test takes 48 ms at this rate: 12 ms at 819.2 SPS (data sheet Rev. B,
+    // Table 1).
     assert!((up_s - 0.11..up_s + 1.2).contains(&counted_s), "{counted_s} s of bursts, up for {up_s} s");
 }
 
-/// A reset by the pin costs at most a second of statistics; a hard fault is recorded with its address; after a brown-out the image starts
-/// afresh: the random contents of memory are taken neither for statistics nor for settings nor for a crash record.
+/// A reset by the pin costs at most a second of statistics, and a hard fault is recorded with its address. After a brown-out the image
+/// starts with empty state: the random contents of memory are taken neither for statistics nor for settings nor for a crash record.
 #[test]
 fn a_restart_keeps_what_its_cause_allows() {
     let keys = [
@@ -201,12 +203,12 @@ fn a_restart_keeps_what_its_cause_allows() {
     answers.iter().for_each(|lines| assert_sampled_since_the_start(lines));
 
     assert_lines(pin, &["start 2: Pin, 8 channels restored", "length 3600 s"]);
-    // The statistics are those of the first stretch up to the last checkpoint, and those of the second.
+    // The statistics are those of the first stretch up to its last checkpoint, and those of the second stretch.
     let restarted = bursts.windows(2).position(|pair| pair[1].0 != pair[0].0 + 1).expect("a gap") + 1;
     let (before, after) = bursts.split_at(restarted);
     let (hello, used) = (decoded.hellos()[0], decoded.healths()[0].used as usize);
     for report in decoded.channels() {
-        // The report is made channel by channel while sampling continues, so a channel may lack the latest samples.
+        // The report is made channel by channel during sampling, so a channel may lack the latest samples.
         let kept = (0..used).map(|fewer| report.samples as usize - (used - fewer)).find(|&kept| {
             let stretches = [&before[..kept.min(before.len())], after];
             kept <= before.len() && in_stretches(&stretches, hello, report).octaves == report.octaves
@@ -225,11 +227,11 @@ fn a_restart_keeps_what_its_cause_allows() {
     assert!([pin, afresh].iter().all(|lines| lines.iter().all(|line| !line.contains("crash record"))));
 }
 
-/// One after the other, each with a report. A failed DMA transfer costs that burst and nothing else: no byte of it is left for the next one.
-/// One whose end raises no interrupt is ended when no burst has come for 25 ms; after such a silence the sensor is left alone for its
-/// start-up time of 290 ms. A sensor that sleeps without end is woken by the pulse of the second step of recovery, which is as long as the
-/// data sheet asks for (Rev. B, Table 1: 20 us), or by a frame of the first. A data-ready line that oscillates at 125 kHz for 50 ms is
-/// masked, and told; the next step of recovery takes its edges again.
+/// The faults come one after the other, each followed by a report. A failed DMA transfer costs only its burst: no byte of it remains for
+/// the next one. A transfer whose end raises no interrupt is ended after 25 ms without a burst; after this silence the sensor is left alone
+/// for its start-up time of 290 ms. A sensor in indefinite sleep is woken by the pulse of the second step of recovery, whose length is that
+/// of the data sheet (Rev. B, Table 1: 20 us), or by a frame of the first. A data-ready line that oscillates at 125 kHz for 50 ms is masked
+/// and reported; the next step of recovery accepts its edges again.
 #[test]
 fn failed_transfers_sleep_and_an_oscillating_line_are_recovered_from() {
     let reports = [2.0, 5.0, 9.5, 13.0].map(|at_s| (at_s, b"r".to_vec()));
@@ -255,7 +257,7 @@ fn failed_transfers_sleep_and_an_oscillating_line_are_recovered_from() {
     }
     assert!(f64::from(stopped.used) > 1.5 * RATE_HZ, "{stopped:?}");
     assert!(f64::from(silent.used) > 3.8 * RATE_HZ, "{silent:?}");
-    // The first step of recovery wakes the sensor by its first frame, and addresses it meanwhile.
+    // The first step of recovery wakes the sensor by its first frame, and addresses it before it is awake.
     let [short, waking @ ..] = &sensor.violations[..] else { panic!("the short frame") };
     assert!(short.ends_with("chip select rose after 10 bytes"), "{short}");
     assert!(waking.iter().all(|frame| frame.ends_with("addressed while busy with WakeUp")), "{waking:?}");
@@ -267,7 +269,7 @@ fn failed_transfers_sleep_and_an_oscillating_line_are_recovered_from() {
     );
     assert_eq!((woken.recoveries, woken.sensor_resets), (2, 0), "{woken:?}");
     assert!(woken.bus_resets - silent.bus_resets <= 1, "{woken:?}");
-    // One and a half seconds before, and at least one of the three after: steps come once a second.
+    // This is one and a half seconds before, and at least one of the three after, since steps come once a second.
     assert!(f64::from(woken.used - silent.used) > 2.5 * RATE_HZ, "{woken:?}");
 
     assert!(decoded.logs().iter().any(|log| log.contains("oscillates and is masked")), "{:?}", decoded.logs());
@@ -275,7 +277,7 @@ fn failed_transfers_sleep_and_an_oscillating_line_are_recovered_from() {
     assert!(f64::from(masked.used - woken.used) > 1.9 * RATE_HZ, "{masked:?}");
 }
 
-/// The counter of microseconds stops, without which no wait would end.
+/// The microsecond counter stops, so that no wait would end.
 #[test]
 #[ignore = "long: eight emulated seconds of a busy loop take half a minute; run with --long"]
 fn the_watchdog_ends_a_hang() {
@@ -292,13 +294,14 @@ fn the_watchdog_ends_a_hang() {
     assert_eq!(hello.boot.cause, BootCause::Watchdog);
     assert_eq!((hello.boot.starts, hello.boot.restored_channels), (2, 8), "{:?}", hello.boot);
     assert_eq!(hello.boot.crash_record, "");
-    // The watchdog's time of 8 s counts an oscillator of 32 kHz, exact here; a real one may be 47 % faster or slower.
+    // The watchdog's 8 s are counted by an oscillator of 32 kHz, which is exact here; a real one may be 47 % faster or
+    // slower.
     let up_s = hello.uptime_us as f64 * 1e-6;
     assert!((seconds - REPORT_S - stopped_s - up_s - 8.0).abs() < 0.6, "up for {up_s} s");
 }
 
-/// A panic is recorded with its place, and is an error in the log of a probe. The period that was programmed is overwritten with 0, which the
-/// main loop finds. After the third crash within ten minutes the device starts without anything that was stored, says so, and takes commands.
+/// A panic is recorded with its place, and is an error in the log of a probe. It is caused by a sample period of 0, which the main loop
+/// detects. After the third crash within ten minutes the device starts without any stored data, reports this, and takes commands.
 #[test]
 fn the_third_crash_in_a_row_is_followed_by_safe_mode() {
     let keys = [(0.1, "i 0\re 3600\r"), (6.5, "s"), (6.7, "e 60\r"), (7.0, "s"), (7.1, "k")];
@@ -322,9 +325,8 @@ fn the_third_crash_in_a_row_is_followed_by_safe_mode() {
     assert!(panics.iter().all(|line| line.level == "error" && line.text.contains("device.rs:")), "{panics:?}");
 }
 
-/// The brown-out level is programmed on the command alone, and once. The boot loader in the system memory of the part is started from a
-/// reset, with that memory at address 0. In the emulator it is empty: the stack pointer that is loaded from there is 0, and the first push
-/// goes to the word below.
+/// The brown-out level is programmed only on command, and once. The boot loader in system memory is started after a reset, with that memory
+/// at address 0. The memory is empty in the emulator, so the loaded stack pointer is 0, and the first push goes to the word below.
 #[test]
 fn brown_out_level_and_boot_loader_follow_their_commands() {
     let keys = [(0.1, "i 0\r"), (1.0, "brownout\r"), (1.3, "brownout\r"), (1.6, "bootsel\r")];
@@ -333,7 +335,7 @@ fn brown_out_level_and_boot_loader_follow_their_commands() {
     let scenario = Scenario { sensor, keys, seconds: 2.0, slow_core: true, ..Scenario::default() };
     let Outcome { received, diagnostics, registers, .. } = run(image(), scenario);
     println!("{diagnostics:#?}");
-    // BOR_LEV = 00: level 3 (RM0090 section 3.9.10).
+    // BOR_LEV = 00 is level 3 (RM0090 section 3.9.10).
     assert_eq!(registers[&FLASH_OPTCR] >> 2 & 3, 0, "brown-out level");
     let decoded = Decoded::decode(&received);
     let told = |text: &str| decoded.logs().iter().filter(|log| log.starts_with(text)).count();

@@ -14,11 +14,10 @@ use simulation::replay;
 use std::path::Path;
 
 const RATE_HZ: f64 = 819.2;
-/// Between these times the raw stream and the reports are off, so that the work of sampling and estimating is measured
-/// alone.
+/// Times between which raw stream and reports are off, so that only sampling and estimating are measured, s.
 const QUIET_S: (f64, f64) = (3.0, 6.0);
 
-/// A debug probe that has stalled, or was pulled off, asks the image to wait for it all the time.
+/// A debug probe that has stalled or was pulled off makes the image wait for it all the time.
 #[test]
 fn no_sample_is_lost_or_doubled_under_full_load() {
     assert_no_sample_lost_in(31.0);
@@ -32,7 +31,7 @@ fn no_sample_is_lost_or_doubled_in_ten_minutes() {
 
 fn assert_no_sample_lost_in(seconds: f64) {
     let mut keys = vec![(1.0, b"i 0\rf 819.2\r".to_vec()), (QUIET_S.1, b"i 15\rw 1\r".to_vec())];
-    // The first two print a fit of every channel.
+    // The first two commands print a fit of every channel.
     let typed =
         [&b"r"[..], b"t", b"?", b"s", b"k", b"e 0\r", b"x\r", b"v", b"k", b"s", b"i 15\r", b"k", b"?", b"s", b"k"];
     let times = (0..).map(|k| QUIET_S.1 + 1.3 + 1.2 * f64::from(k)).take_while(|&at| at < seconds - 6.0);
@@ -52,7 +51,7 @@ fn assert_no_sample_lost_in(seconds: f64) {
     assert!(bursts.len() as f64 > (seconds - 1.1) * RATE_HZ - 100.0, "{} bursts", bursts.len());
     assert!(sensor.samples - bursts[bursts.len() - 1].0 <= 1);
 
-    // The raw stream is what the sensor sent, in order and complete.
+    // The raw stream equals what the sensor sent, in order and complete.
     let decoded = Decoded::decode(&received);
     assert_eq!((decoded.counters.missing, decoded.counters.bad_frames), (0, 0), "{:?}", decoded.counters);
     let raw = decoded.raw();
@@ -64,7 +63,7 @@ fn assert_no_sample_lost_in(seconds: f64) {
         assert_eq!(*burst, sent[first + k], "burst {k}");
     }
 
-    // The last report: nothing lost, equal to the host's bit for bit.
+    // In the last report no sample is lost, and it equals the host's bit for bit.
     let health = **decoded.healths().last().expect("a report");
     assert_eq!((health.used, health.lost_edges + health.spurious_edges + health.queue_full), (health.bursts, 0));
     assert_eq!((health.recoveries, health.raw_dropped, health.serial_overruns), (0, 0, 0), "{health:?}");
@@ -107,8 +106,8 @@ fn load_between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
     (instructions / (to.samples - from.samples), share)
 }
 
-/// The file that `imunoise record` writes from the serial bytes and a log of the frames that the sensor sent, with the
-/// times of its own clock, give the same report.
+/// The file that `imunoise record` writes from the serial bytes, and a log of the sensor's frames with times of the
+/// board's own clock, give the same report.
 fn assert_recorded_stream_gives_the_identical_report(decoded: &Decoded, bursts: &[(u64, [u8; BURST_BYTES])]) {
     let folder = tempfile::tempdir().expect("a folder");
     let report = |file: &Path| {

@@ -1,18 +1,19 @@
-//! The images: built as they are built to be flashed, their size, and a copy with a smaller stack.
+//! The images: builds as for flashing, their sizes, and copies with a smaller stack.
 
 use std::path::{Path, PathBuf};
 use system_tests::{Image, image_folder};
 
-/// Builds the program of a package for a target, with further arguments of cargo, and returns the path of a copy of its ELF with the
-/// name `copy`.
+/// Builds a program of a package for a target, with further arguments of cargo, and returns the path of a copy of its ELF with the name
+/// `copy`.
 pub(crate) fn build_package((package, program): (&str, &str), target: &str, arguments: &[&str], copy: &str) -> PathBuf {
     Image { package, program, target, profile: "image", arguments, variable: None }.build(copy)
 }
 
-/// Vector table of the STM32F405, and the start of its core-coupled memory, which is the stack (RM0090 section 2.3).
+/// The vector table of the STM32F405, and the start of its core-coupled memory, which holds the stack (RM0090 section
+/// 2.3).
 const FLASH_START: u32 = 0x0800_0000;
 const STACK_START: u32 = 0x1000_0000;
-/// RAM of every Cortex-M.
+/// Addresses of RAM on every Cortex-M.
 const RAM: std::ops::Range<u32> = 0x2000_0000..0x3000_0000;
 
 /// An ELF of 32 bits, little-endian.
@@ -36,9 +37,9 @@ impl Elf {
 #[derive(Debug)]
 pub(crate) struct Size {
     pub(crate) flash: u32,
-    /// Static variables, retained memory among them; without the stack.
+    /// Static variables, including retained memory, without the stack.
     pub(crate) statics: u32,
-    /// Those of them whose contents are copied from flash at the start.
+    /// Static variables whose contents are copied from flash at the start.
     pub(crate) initialised: u32,
 }
 
@@ -61,11 +62,11 @@ pub(crate) fn size(image: &Path) -> Size {
     size
 }
 
-/// Writes a copy of an image with a stack of so many bytes: the first word of the vector table, from which the
-/// processor loads its stack pointer, is changed.
+/// Writes a copy of an image with a stack of `bytes` bytes. It changes the first word of the vector table, from which
+/// the processor loads its stack pointer.
 pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
     let mut elf = Elf::read(image);
-    // The program headers: at 4 the offset in the file, at 12 the physical address, at 16 the size.
+    // A program header has the offset in the file at 4, the physical address at 12, the size at 16.
     let mut headers = (0..elf.half(44)).map(|segment| elf.word(28) as usize + 32 * segment);
     let vectors = headers.find(|&header| elf.word(header + 12) == FLASH_START && elf.word(header + 16) > 0);
     let at = elf.word(vectors.expect("a vector table") + 4) as usize;

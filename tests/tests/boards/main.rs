@@ -1,5 +1,5 @@
-//! The images, as they are built to be flashed, run in emulators against the virtual sensor: those for the STM32F405 in a program of
-//! `tests/tools`, that for the Raspberry Pi Pico in rp2040js.
+//! The images, built as for flashing, run in emulators with the virtual sensor: those for the STM32F405 in a program of `tests/tools`, that
+//! for the Raspberry Pi Pico in rp2040js.
 
 mod bench;
 mod checklist;
@@ -31,7 +31,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     let sensor = sensor.expect("the sensor on the bus");
     assert_eq!(diagnostics, [""; 0], "neither resets nor accesses to unmapped addresses");
 
-    // The bus keeps the timing of the data sheet. Eight periods of SCK take 12 190.5 ns; the processor may add 2 %
+    // The bus keeps the timing of the data sheet. Eight periods of SCK take 12 190.5 ns, and the processor may add 2 %
     // between bytes.
     assert_bus_times(&sensor, 75, 0);
     assert_eq!(sensor.odd_words, 0);
@@ -77,8 +77,8 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     let measured = hello.measured_rate_hz.unwrap();
     assert!((measured / 204.8 - 1.0).abs() < 1e-6, "{measured}");
 
-    // The sensor is left alone for its start-up time of 290 ms and configured 50 ms later; its self-test takes 48 ms at this rate;
-    // from then on 204.8 samples a second, of which the filter takes four to settle, and the gate against gross errors 32 to learn.
+    // The sensor is left alone for its start-up time of 290 ms and configured 50 ms later. Its self-test takes 48 ms at this rate. From
+    // then on there are 204.8 samples a second, of which the filter takes four to settle, and the gate against gross errors 32 to learn.
     let mut least = ((uptime_s - 0.42) * 204.8) as u64 - 32;
     for (report, channel) in channels.iter().zip(CHANNELS) {
         let Message::Channel(report) = report else { panic!("{report:?}") };
@@ -115,11 +115,11 @@ fn a_missing_sensor_is_reported_every_second() {
     }
 }
 
-/// Host and device analyse alike only with the same candidates and the same averaging times.
+/// Host and device give the same analysis only with the same candidates and averaging times.
 #[test]
 fn the_firmware_analyses_with_the_settings_of_the_host() {
     for range in [GyroRange::Dps300, GyroRange::Dps150, GyroRange::Dps75] {
-        // The host derives the filters that are read slowly from the sample rate.
+        // The host derives the filters with decimation from the sample rate.
         let own_rate: Vec<_> =
             firmware::learner::FILTERS.into_iter().filter(|filter| filter.decimation == 1.0).collect();
         assert_eq!(measurement::adis16405::profile(range.lsb()).filters, own_rate);

@@ -1,5 +1,5 @@
-//! The image for the Raspberry Pi Pico, as it is built to be flashed, run in the emulator rp2040js (npm) under Node.js
-//! against the virtual sensor. Its core has no floating-point unit, and reports the same numbers.
+//! The image for the Raspberry Pi Pico, built as for flashing, in the emulator rp2040js (npm) under Node.js with the
+//! virtual sensor. Its core has no floating-point unit, and reports the same numbers.
 
 mod bench;
 
@@ -15,7 +15,7 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
     VirtualAdis16405::new(NoiseModel::paper(), seed)
 }
 
-/// Bytes that the UART of a sound board has sent, and the part.
+/// The bytes that the UART of a faultless board has sent, and the part.
 pub(crate) fn run_sound(seed: u64, seconds: f64, keys: &[&str]) -> (Vec<(u64, u8)>, VirtualAdis16405) {
     let Outcome { received, part, .. } = run(SOUND, sensor(seed), seconds, keys, &[]);
     (received, part)
@@ -28,10 +28,10 @@ fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     let outcome = run(SOUND, sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
     println!("{} instructions in {SECONDS} s; {}", outcome.instructions, outcome.diagnostics);
     let (bursts, part) = (&outcome.bursts, &outcome.part);
-    // The sensor checks the times between frames, and the clock.
+    // The sensor checks the times between frames and the clock.
     assert_eq!(part.violations(), []);
     assert!(bursts.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1), "every sample is read once");
-    // The sensor is left alone for its start-up time of 290 ms and configured 50 ms later; its self-test takes 48 ms.
+    // The sensor is left alone for its start-up time of 290 ms and configured 50 ms later. Its self-test takes 48 ms.
     assert!(bursts.len() as f64 > (SECONDS - 0.45) * RATE_HZ, "{} bursts", bursts.len());
 
     let decoded = Decoded::decode(&outcome.received);
@@ -50,7 +50,7 @@ fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     println!("{health:?}");
 }
 
-/// The raw stream is complete, and each fault is recovered from and counted.
+/// The raw stream is complete, and the device recovers from each fault and counts it.
 #[test]
 fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     const FAST_HZ: f64 = 819.2;
@@ -66,20 +66,20 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
         run(SOUND, sensor(9), 9.2, &keys, &events);
     assert!(!diagnostics.contains("SCK is driven before chip select"), "{diagnostics}");
     let [control, edges, watchdog, miso, data_ready] = registers[..] else { panic!("{registers:x?}") };
-    // Section 2.19.6.3: MISO and data ready are pulled down (bit 2) and not up (bit 3), so that an unplugged sensor gives no edges.
+    // MISO and data ready are pulled down (bit 2) and not up (bit 3), so that an unplugged sensor gives no edges (section 2.19.6.3).
     assert_eq!([miso, data_ready].map(|pad| pad >> 2 & 0b11), [0b01; 2], "{registers:x?}");
-    // RP2040 data sheet, sections 4.4.4 (SPH and SPO), 2.19.6.1 (rising edge of GP20 and no other of GP16 to GP23), and 4.7.6
-    // (a debugger at either core or the JTAG pauses the watchdog).
+    // RP2040 data sheet: sections 4.4.4 (SPH and SPO), 2.19.6.1 (only the rising edge of GP20 among GP16 to GP23), and 4.7.6 (a debugger at
+    // either core or the JTAG pauses the watchdog).
     assert_eq!(control >> 6 & 0b11, 0b11, "SPI mode 3: {control:#x}");
     assert_eq!(edges, 1 << (4 * (20 % 8) + 3), "edges that interrupt: {edges:#x}");
     assert_eq!(watchdog >> 24 & 0b111, 0b111, "the watchdog stops with the debugger: {watchdog:#x}");
-    // Data sheet of the sensor, Rev. B, Table 2.
+    // The limit is from Table 2 of the sensor's data sheet, Rev. B.
     assert!(shortest_slow_read_ns >= 150_000, "{shortest_slow_read_ns} ns");
     let decoded = Decoded::decode(&received);
     println!("{:#?}", decoded.logs());
     assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
 
-    // The raw stream of two seconds is what the sensor sent, in order and complete.
+    // The raw stream of two seconds equals what the sensor sent, in order and complete.
     let raw = decoded.raw();
     assert!(raw.len() as f64 > 1.9 * FAST_HZ, "{} bursts in the stream", raw.len());
     let sent: Vec<Burst> = bursts.iter().map(|(_, bytes)| Burst::from_bytes(bytes)).collect();
@@ -87,12 +87,12 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     let first = first.expect("the stream is part of the bursts that were sent");
     assert!(bursts[first..first + raw.len()].windows(2).all(|pair| pair[1].0 == pair[0].0 + 1), "every sample once");
 
-    // The counters are printed as text, as a report takes seconds on this core.
+    // The counters are printed as text, since a report takes seconds on this core.
     println!("{:#?}", decoded.lines);
     let counter = |name: &str| counter(&decoded.lines, name).unwrap_or(0);
     assert_eq!((counter("stuck_low"), counter("recoveries")), (16, 3));
     assert_eq!((counter("queue_full"), counter("raw_dropped"), counter("serial_overruns")), (0, 0, 0));
-    // Sampling continues while the lines are printed one after the other.
+    // Sampling continues while the lines are printed.
     assert!((0..9).contains(&(counter("used") + 16 - counter("bursts"))), "{:?}", decoded.lines);
     assert!(f64::from(counter("used")) > 5.0 * FAST_HZ);
     assert!(decoded.lines.iter().any(|line| line.contains("sensor sampled")), "{:?}", decoded.lines);
@@ -100,8 +100,8 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert_eq!(part.violations(), []);
 }
 
-/// The host finds the port by its name and the number of the board, reads a report and types commands. The bytes of USB are, byte for
-/// byte, what the UART has sent since the port was opened.
+/// The host finds the port by its name and the number of the board, reads a report and sends commands. The bytes of USB equal those of the
+/// UART since the port was opened.
 #[test]
 fn usb_carries_the_report_of_the_uart() {
     let board = Pico { usb_reads_at: Some(0.0), ..SOUND };
@@ -128,8 +128,8 @@ fn usb_carries_the_report_of_the_uart() {
     assert!((11.5..11.7).contains(&boot_loader_s), "{boot_loader_s} s");
 }
 
-/// The host opens the port and reads nothing for six seconds of the raw stream at full speed: messages are lost on USB alone, whole and
-/// counted. Then it reads on.
+/// The host opens the port and reads nothing for six seconds of the raw stream at full speed. Messages are lost on USB only, as a whole and
+/// counted. Then the host reads again.
 #[test]
 fn an_unread_usb_port_loses_output_alone() {
     let board = Pico { usb_reads_at: Some(6.0), ..SOUND };
@@ -141,7 +141,8 @@ fn an_unread_usb_port_loses_output_alone() {
     assert_eq!((uart.counters.bad_frames, uart.counters.missing, usb.counters.bad_frames), (0, 0, 0));
     assert!(uart.raw().len() as f64 > 4.8 * 819.2, "{} bursts in the stream of the UART", uart.raw().len());
     assert!(usb.raw().len() < uart.raw().len() / 10, "{} bursts in the stream of USB", usb.raw().len());
-    // Messages of the stream are dropped, and lines, which have no number. The next message of the stream tells how many.
+    // Messages of the stream are dropped, and lines, which have no number. The next message shows how many messages are
+    // missing.
     assert!(usb.counters.missing > 200 && u64::from(counter("usb_dropped")) >= usb.counters.missing);
     assert_eq!(
         (counter("lost_edges"), counter("queue_full"), counter("raw_dropped"), counter("recoveries")),
@@ -153,8 +154,8 @@ fn an_unread_usb_port_loses_output_alone() {
     assert!(outcome.longest_unfed_s < 0.5, "{} s", outcome.longest_unfed_s);
 }
 
-/// A port that takes nothing for half a minute, as a controller that hangs, is reset: the host finds the device a second time. Sampling and
-/// the UART go on.
+/// A port that accepts nothing for half a minute, as with a hanging controller, is reset. The host finds the device a second time. Sampling
+/// and the UART continue.
 #[test]
 #[ignore = "long: half an emulated minute takes a minute; run with --long"]
 fn a_usb_port_that_stalls_is_reset() {
@@ -169,8 +170,8 @@ fn a_usb_port_that_stalls_is_reset() {
     assert!(f64::from(counter("used")) > 31.0 * RATE_HZ, "{:?}", uart.lines);
 }
 
-/// Rate, range and filter are kept in flash by the functions of the boot ROM, and found after the supply was off. The write costs a
-/// gap, and no probe.
+/// Rate, range and filter are stored in flash by functions of the boot ROM, and found after the supply was off. The write costs a gap, but
+/// no probe.
 #[test]
 fn settings_survive_power_in_the_flash_of_the_pico() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -182,7 +183,7 @@ fn settings_survive_power_in_the_flash_of_the_pico() {
     let kept = "settings and models are kept without power; not sampled for ";
     let told = lines.iter().find_map(|line| line.strip_prefix(kept)?.strip_suffix(" ms")?.parse::<u32>().ok());
     let milliseconds = told.expect("an answer to persist");
-    // Pages of 0.4 ms and the sectors that a new ring erases, 45 ms each.
+    // The write takes pages of 0.4 ms, and 45 ms for each sector that a new ring erases.
     assert!((1..500).contains(&milliseconds), "{milliseconds} ms");
     let counter = |name: &str| counter(&lines, name).unwrap_or(0);
     assert!(counter("lost_edges") <= milliseconds * 102 / 1000 + 2, "{lines:?}");
@@ -195,9 +196,9 @@ fn settings_survive_power_in_the_flash_of_the_pico() {
     assert_eq!(hello.boot.cause, link::BootCause::PowerOn);
 }
 
-/// A board outside of `firmware` connects RST: the fourth step of the recovery resets the sensor by it, and samples flow again.
+/// A board outside of `firmware` connects RST. The fourth step of the recovery resets the sensor by it, and samples flow again.
 #[test]
-fn a_board_of_ones_own_resets_the_sensor_by_its_pin() {
+fn the_example_board_resets_the_sensor_by_its_pin() {
     let events = [(1.5, Event::Stuck(Some(0))), (5.6, Event::Stuck(None))];
     let outcome = run_example(sensor(25), 8.5, &["0.5=i 0\r", "8.0=k"], &events);
     let lines = Decoded::decode(&outcome.received).lines;
@@ -205,11 +206,11 @@ fn a_board_of_ones_own_resets_the_sensor_by_its_pin() {
     let counter = |name: &str| counter(&lines, name).unwrap_or(0);
     assert!(outcome.resets >= 1 && counter("reset_lines") == outcome.resets, "{} pulses", outcome.resets);
     assert_eq!(counter("recoveries"), 1);
-    // A second before, and more than one afterwards.
+    // There is a second of samples before, and more than one afterwards.
     assert!(f64::from(counter("used")) > 2.2 * RATE_HZ, "{lines:?}");
 }
 
-/// Answers that a person reads at the bench, of the emulated part.
+/// The answers for a person at the bench, for the emulated part.
 #[test]
 fn the_bench_console_reads_registers_and_times() {
     let keys = [
@@ -226,7 +227,7 @@ fn the_bench_console_reads_registers_and_times() {
     let lines = Decoded::decode(&outcome.received).lines;
     println!("{lines:#?}");
     let has = |expected: &str| assert!(lines.iter().any(|line| line.starts_with(expected)), "{expected}: {lines:?}");
-    // Data sheet of the part, Rev. B: PROD_ID is the number of the part, SMPL_PRD the divisor less 1.
+    // PROD_ID is the number of the part, SMPL_PRD the divisor less 1 (data sheet of the part, Rev. B).
     has("PROD_ID    0x56  0x4015  16405");
     has("SMPL_PRD   0x36  0x0007  7");
     has("ALM_MAG1   0x40  0x1234  4660");
@@ -235,16 +236,16 @@ fn the_bench_console_reads_registers_and_times() {
         let digits = line[prefix.len()..].split_ascii_whitespace().next().expect("a number");
         digits.parse().expect("a number")
     };
-    // 208 bits at the clock that is set, and less than a tenth more.
+    // A burst takes 208 bits at the clock that is set, and less than a tenth more.
     let (set_hz, burst_us) =
         (number("SCK: "), lines.iter().find_map(|line| line.split(" took ").nth(1)).expect("a burst"));
     let burst_us: f64 = burst_us.split(' ').next().expect("a number").parse().expect("a number");
     assert!((1.0..1.1).contains(&(burst_us * 1e-6 * set_hz / 208.0)), "{burst_us} us at {set_hz} Hz");
-    // The console addresses the part as in low-power mode, whose frames are 150 us apart (Table 2 of the data sheet): behind 16 bits at
+    // The console addresses the part as in low-power mode, whose frames are 150 us apart (Table 2 of the data sheet). After 16 bits at
     // 299,044 Hz chip select is high for 96 us.
     assert!((96.0..106.0).contains(&number("stall: CS high for ")), "{lines:?}");
     assert!((204.0..206.0).contains(&number("DRDY: ")), "{lines:?}");
-    // The emulated part's pulse, within some us.
+    // The pulse of the emulated part is known to some us.
     assert!((90.0..115.0).contains(&number("DRDY: high for ")), "{lines:?}");
     // The deflections of the virtual part have opposite signs.
     let deflections = ["positive ", "negative "].map(|sign| {
@@ -258,8 +259,8 @@ fn the_bench_console_reads_registers_and_times() {
     assert_eq!((counter("recoveries"), counter("spurious_edges")), (0, 0), "{lines:?}");
 }
 
-/// An error of the DMA costs the burst and what comes until the transfer is abandoned, 25 ms later, and for the start-up time
-/// of the sensor, 290 ms, after such a silence; then no byte of it is left and the channel works.
+/// An error of the DMA costs the burst and the samples until the transfer is abandoned 25 ms later, and those in the sensor's start-up time
+/// of 290 ms after this silence. Then no byte of it remains, and the channel works.
 #[test]
 fn a_failed_transfer_is_recovered_from() {
     let board = Pico::with_fault(1.0, Fault::Dma);
@@ -269,16 +270,16 @@ fn a_failed_transfer_is_recovered_from() {
     println!("{:#?}", decoded.lines);
     assert_eq!((counter("bus_errors"), counter("recoveries"), counter("shifted")), (1, 1, 0));
     assert!(counter("bursts").abs_diff(counter("used")) <= 1, "{:?}", decoded.lines);
-    // Samples that the sensor's filter still mixes after its start are counted and not used.
+    // Samples that the sensor's filter mixes with its start are counted and not used.
     assert!(f64::from(counter("used") + counter("settling")) > 1.5 * RATE_HZ, "{:?}", decoded.lines);
     assert!((4..=6).contains(&led_changes), "{led_changes} changes of the LED in 2.6 s");
 }
 
-/// Statistics and settings survive every restart but that by power-on, and the next start tells what happened: the text of a
+/// Statistics and settings survive every restart except power-on. The next start reports the cause: the text of a
 /// panic, the address of a fault, nothing after a lock-up, which the watchdog ends within 8.3 s.
 #[test]
 fn a_restart_keeps_the_statistics_and_tells_its_cause() {
-    // The panic comes when not every channel has been kept.
+    // The panic comes before every channel has been checkpointed.
     let cases = [
         (None, "start 2: Software, 8 channels restored", ""),
         (Some((0.25, Fault::Period)), "start 2: Software, ", "panic at device.rs:"),
@@ -296,14 +297,15 @@ fn a_restart_keeps_the_statistics_and_tells_its_cause() {
         assert!(lines.iter().any(|line| line.contains(start)), "{start}: {lines:?}");
         let crashed = lines.iter().find_map(|line| line.split("crash record: ").nth(1));
         assert!(crashed.unwrap_or_default().starts_with(record) && crashed.is_none() == record.is_empty(), "{lines:?}");
-        // The sensor goes on while the core stands still: it is sampled again for two seconds, and no sample since is lost.
+        // The sensor continues while the core stands still. It is sampled again for two seconds, and no sample is lost
+        // since.
         let counter = |name: &str| counter(&lines, name).unwrap_or(0);
         assert!(counter("used") > (1.4 * RATE_HZ) as u32 && counter("lost_edges") == 0, "{lines:?}");
         assert_eq!(part.violations(), []);
     }
 }
 
-/// Without the crystal there is no serial port; the LED changes its level 80 times and the next attempt follows.
+/// Without the crystal there is no serial port. The LED changes its level 80 times, then the next attempt follows.
 #[test]
 fn without_a_crystal_the_led_blinks_fast() {
     let board = Pico { crystal_starts: false, ..SOUND };
@@ -312,15 +314,15 @@ fn without_a_crystal_the_led_blinks_fast() {
     assert!((30..=80).contains(&led_changes), "{led_changes} changes of the LED in 0.4 s");
 }
 
-/// A whole epoch: its report, the models of all channels, and a quarter of the stack never used. The watchdog, whose time is
-/// 8.3 s, is fed during the longest step too.
+/// A whole epoch: its report, the models of all channels, and a quarter of the stack never used. The watchdog with its
+/// time of 8.3 s is also fed during the longest step.
 #[test]
 #[ignore = "long: 150 emulated seconds with software floating point take some minutes; run with --long"]
 fn the_pico_learns_from_an_epoch() {
     assert_learns("Raspberry Pi Pico", true);
 }
 
-/// Cost of USB, from the difference.
+/// The cost of USB is the difference from the image with USB.
 #[test]
 #[ignore = "long: 150 emulated seconds with software floating point take some minutes; run with --long"]
 fn the_pico_learns_from_an_epoch_without_usb() {
@@ -341,18 +343,18 @@ fn assert_learns(board: &str, usb: bool) {
     assert!(learned >= 6);
     assert!(outcome.longest_unfed_s < 0.5, "{} s", outcome.longest_unfed_s);
     assert_eq!((health.used, health.lost_edges, health.queue_full), (health.bursts, 0, 0), "{health:?}");
-    // RP2040 data sheet, section 2.6.2; the stack is the rest of 264 KiB.
+    // The sizes are from the RP2040 data sheet, section 2.6.2; the stack is the rest of 264 KiB.
     let memory = Memory { flash: 2 << 20, ram: 200 << 10 };
     let awake_percent = f64::from(counter(&decoded.lines, "awake_permille").expect("the counters")) / 10.0;
     assert_within_budget(&Costs { board, memory, image: &image, core_mhz: 125.0, awake_percent, health });
 }
 
-/// As on the other boards: names, parameters and errors of four hidden effects are the host's on the same samples, bit for bit, and
-/// the table says them in words.
+/// Names, parameters and errors of four hidden effects equal those of the host for the same samples, bit for bit, as on the other boards.
+/// The table states them in words.
 #[test]
 #[ignore = "long: five and a half emulated minutes with software floating point take a quarter of an hour; run with --long"]
 fn the_pico_finds_hidden_effects() {
-    // An epoch is learned from in 110 s, and the next one ends when that is done: at 60, 170 and, with its new length, long after the end.
+    // Learning from an epoch takes 110 s, and the next epoch ends after it: at 60 s, at 170 s and, with its new length, long after the end.
     const LEARNED_S: f64 = EPOCH_S + 2.0 * 120.0;
     let epoch = format!("0.5=i 0\re {EPOCH_S}\r");
     let table = format!("{LEARNED_S}=t");

@@ -1,4 +1,5 @@
-//! The sampling path of each image: the machine code that the two sampling interrupts and that of the estimators reach.
+//! The sampling path of each image: the machine code that the two sampling interrupts and the interrupt of the
+//! estimators reach.
 
 use super::bench::{TARGET, feather_image, image};
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,12 +10,12 @@ use system_tests::Image;
 
 /// The target of the Pico.
 const PICO: &str = "thumbv6m-none-eabi";
-/// Callers of a function by its address alone, and the closure that it calls: the encoder of messages, which hands over bytes.
+/// Functions that are called only by their address, and the closure that calls the encoder of messages.
 const CALLS_BY_ADDRESS: [&str; 2] = ["firmware::transmit::TransmitQueue::send", "link::frame::CobsFlavor"];
 const CALLED_BY_ADDRESS: &str = "firmware::transmit::TransmitQueue::send::{{closure}}";
-/// The checks that are left, in crates of others: what is called, and a part of the place. A queue of `heapless` divides by the number of its
-/// slots, of which each end has a copy in memory. `postcard` cuts an integer, `[..=last]`, out of the bytes that it has just written. The HAL of
-/// the RP2040 takes no number but 0 or 1 from the register that tells its cores apart.
+/// Checks that remain in other crates: the called function, and a part of the place. A queue of `heapless` divides by its number of slots,
+/// which each end has in memory. `postcard` takes the slice `[..=last]` of the bytes of an integer that it has just written. The HAL of the
+/// RP2040 takes only 0 or 1 from the register that distinguishes its cores.
 const LEFT: [(&str, &str); 3] = [
     ("core::panicking::panic_const::panic_const_rem_by_zero", "/src/spsc.rs:"),
     ("RangeToInclusive<usize> as core::slice::index::SliceIndex", "/slice/index.rs:"),
@@ -28,7 +29,7 @@ struct Call {
     place: String,
 }
 
-/// A function of an image, by the disassembler.
+/// A function of an image, from the disassembler.
 #[derive(Default)]
 struct Function {
     name: String,
@@ -69,7 +70,7 @@ fn functions(image: &Path) -> BTreeMap<u32, Function> {
     functions
 }
 
-/// True if a function panics, or is one that finds out whether to.
+/// True if a function panics, or decides whether to panic.
 fn is_panic(name: &str) -> bool {
     [
         "core::slice::index::SliceIndex",
@@ -83,7 +84,7 @@ fn is_panic(name: &str) -> bool {
     .any(|part| name.contains(part))
 }
 
-/// Asserts that nothing that these interrupts reach panics, and returns those of [`LEFT`] that are reached.
+/// Asserts that no function that these interrupts reach panics, and returns the entries of [`LEFT`] that are reached.
 fn assert_no_panic(image: &Path, interrupts: [&str; 3]) -> BTreeSet<&'static str> {
     let functions = functions(image);
     let is_root = |name: &str| interrupts.contains(&name) || name == CALLED_BY_ADDRESS;
@@ -111,7 +112,7 @@ fn assert_no_panic(image: &Path, interrupts: [&str; 3]) -> BTreeSet<&'static str
     left
 }
 
-/// The sampling interrupts validate a burst and queue it; that of the estimators adds it to all sums and sends the raw stream.
+/// The sampling interrupts validate a burst and queue it. The interrupt of the estimators adds it to all sums and sends the raw stream.
 #[test]
 fn the_sampling_path_of_each_image_has_no_panic() {
     let h405 = ["EXTI0", "DMA2_STREAM0", "CAN1_TX"];
@@ -128,7 +129,7 @@ fn the_sampling_path_of_each_image_has_no_panic() {
     assert_eq!(left, BTreeSet::from(LEFT.map(|(name, _)| name)), "checks that are left");
 }
 
-/// The main loop panics where a check fails, so that the path to it would be seen.
+/// The main loop panics if a check fails, so the search must find its panics.
 #[test]
 fn the_main_loop_has_panics() {
     let functions = functions(image());
@@ -136,15 +137,15 @@ fn the_main_loop_has_panics() {
     assert!(calls.flat_map(|of| &of.calls).any(|call| functions.get(&call.to).is_some_and(|of| is_panic(&of.name))));
 }
 
-/// The functions that run while the flash of the Pico takes commands.
+/// The functions that run while the Pico's flash executes commands.
 const IN_RAM: [&str; 3] = ["read_unique_id", "erase_sector", "program_page"];
 /// Addresses of the flash.
 const FLASH: Range<u32> = 0x1000_0000..0x1100_0000;
 
-/// While the flash takes commands nothing can be read from it: the functions that command it lie in RAM, call nothing in flash by its
-/// address, and know no address there. They call the boot ROM and the copy of the second stage through pointers.
+/// The flash cannot be read while it executes commands. The functions that command it are in RAM, call no function in flash by its address,
+/// and contain no address there. They call the boot ROM and the copy of the second stage through pointers.
 #[test]
-fn what_runs_while_the_flash_is_busy_does_not_use_it() {
+fn code_that_runs_while_the_flash_is_busy_does_not_use_it() {
     let image = Image::of_board("pico", PICO, &[]);
     let output = Command::new("arm-none-eabi-objdump")
         .args(["--disassemble-all", "--section=.data", "--demangle", "--no-show-raw-insn"])

@@ -11,7 +11,7 @@ const RX: usize = 0;
 const TX: usize = 1;
 /// Entries of the receive buffer of SPI0.
 const BUFFER: u32 = 8;
-/// READ_ERROR and WRITE_ERROR, cleared by ones.
+/// READ_ERROR and WRITE_ERROR, which are cleared by writing ones.
 const ERRORS: u32 = 1 << 30 | 1 << 29;
 
 /// SPI0 and the two DMA channels that serve it.
@@ -22,7 +22,7 @@ pub struct Spi0<W: ValidSpiPinout<SPI0>> {
 }
 
 impl<W: ValidSpiPinout<SPI0>> Spi0<W> {
-    /// Takes SPI0, whose clock this is, and starts the DMA.
+    /// Takes SPI0, whose clock is `clock`, and starts the DMA.
     pub fn new(spi: Spi<spi::Enabled, SPI0, W, 8>, clock: HertzU32, dma: DMA, resets: &mut RESETS) -> Self {
         resets.reset().modify(|_, w| w.dma().clear_bit());
         let _in_reset_otherwise = wait_for(|| resets.reset_done().read().dma().bit_is_set());
@@ -43,7 +43,7 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
 
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
         self.spi.set_baudrate(self.clock, limit_hz.Hz());
-        // Two dividers, rounded up (data sheet, section 4.4.3.4).
+        // The clock has two dividers, rounded up (data sheet, section 4.4.3.4).
         let prescale = u32::from(registers().sspcpsr().read().cpsdvsr().bits());
         let rate = u32::from(registers().sspcr0().read().scr().bits());
         self.clock.to_Hz().div_ceil(prescale.max(1) * (rate + 1))
@@ -65,7 +65,7 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
         spi.sspicr().write(|w| w.roric().clear_bit_by_one().rtic().clear_bit_by_one());
     }
 
-    /// The end raises the interrupt DMA_IRQ_0.
+    /// The end of the transfer raises the interrupt DMA_IRQ_0.
     fn start(&mut self, request: &'static [u8], received: &mut [u8]) {
         let data = registers().sspdr().as_ptr() as u32;
         let (request_at, received_at) = (request.as_ptr() as u32, received.as_mut_ptr() as u32);
@@ -80,7 +80,7 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
             }
             registers.ch_ctrl_trig().write(|w| {
                 w.data_size().size_byte().incr_read().bit(channel == TX).incr_write().bit(channel == RX);
-                // Cleared by ones (data sheet, section 2.5.7).
+                // The errors are cleared by writing ones (data sheet, section 2.5.7).
                 w.read_error().clear_bit_by_one().write_error().clear_bit_by_one();
                 // SAFETY: a channel that is chained to itself triggers no other.
                 unsafe { w.chain_to().bits(channel as u8) };
@@ -108,7 +108,7 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
                 // SAFETY: disables the channel and clears its errors; nothing is triggered through this alias.
                 registers.ch_al1_ctrl().write(|w| unsafe { w.bits(ERRORS) });
             }
-            // An abort may complete the transfer, too (erratum RP2040-E13).
+            // An abort may also complete the transfer (erratum RP2040-E13).
             // SAFETY: as above.
             self.dma.ints0().write(|w| unsafe { w.bits(1 << RX) });
         }

@@ -20,12 +20,12 @@ struct Command {
     flash_range_erase: unsafe extern "C" fn(u32, usize, u32, u8),
     flash_range_program: unsafe extern "C" fn(u32, *const u8, usize),
     boot2: unsafe extern "C" fn(),
-    /// From the flash's beginning.
+    /// Offset from the beginning of the flash, bytes.
     offset: u32,
     data: *mut u8,
 }
 
-/// `function` must lie in RAM.
+/// Runs `function`, which must lie in RAM.
 fn run(function: unsafe extern "C" fn(&Command), offset: u32, data: *mut u8) {
     // SAFETY: flash, which is readable here.
     let boot2: [u32; BOOT2_WORDS] = core::array::from_fn(|word| unsafe { FLASH.add(word).read_volatile() });
@@ -63,9 +63,9 @@ const CTRLR1: usize = 1;
 const SSIENR: usize = 2;
 const SR: usize = 10;
 const DR0: usize = 24;
-/// TMOD of CTRLR0: sends, then receives CTRLR1 + 1 bytes.
+/// TMOD of CTRLR0: send, then receive CTRLR1 + 1 bytes.
 const EEPROM_READ: u32 = 3 << 8;
-/// RFNE of SR.
+/// RFNE of SR: a byte was received.
 const RECEIVED: u32 = 1 << 3;
 
 #[inline(never)]
@@ -82,7 +82,7 @@ unsafe extern "C" fn read_unique_id(command: &Command) {
         SSI.add(DR0).write_volatile(READ_UNIQUE_ID);
         let mut index = 0;
         while index < DUMMY_BYTES + UNIQUE_ID_BYTES {
-            // A byte comes within some µs.
+            // A byte arrives within some µs.
             while SSI.add(SR).read_volatile() & RECEIVED == 0 {}
             let byte = SSI.add(DR0).read_volatile() as u8;
             if index >= DUMMY_BYTES {
@@ -99,7 +99,7 @@ unsafe extern "C" fn read_unique_id(command: &Command) {
 
 const SECTOR: usize = 4096;
 const PAGE: usize = 256;
-/// For the boot ROM, beside a larger block and its instruction.
+/// Instruction that erases a sector; the boot ROM takes it as the instruction that erases a block.
 const ERASE_SECTOR: u8 = 0x20;
 
 #[inline(never)]

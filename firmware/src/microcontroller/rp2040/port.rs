@@ -12,7 +12,7 @@ pub struct Uart0Port<W: ValidUartPinout<UART0>> {
 }
 
 impl<W: ValidUartPinout<UART0>> Uart0Port<W> {
-    /// Enables the receive interrupt.
+    /// Makes the port and enables its receive interrupt.
     pub fn new(mut uart: UartPeripheral<uart::Enabled, UART0, W>, queues: UartQueues) -> Self {
         uart.enable_rx_interrupt();
         Self { uart, queues }

@@ -16,24 +16,25 @@ use rp2040_hal::gpio::{DynPinId, FunctionSioInput, FunctionSioOutput, Interrupt,
 use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
 
 const CRYSTAL_HZ: u32 = 12_000_000;
-/// For the main loop and SysTick; at most 8.388 s.
+/// Time of the watchdog, fed by the main loop and SysTick; at most 8.388 s.
 const WATCHDOG_MS: u32 = 8_300;
-/// Feeding by SysTick after the main loop, s; the longest step, a channel's fit, takes 2.5 s in the emulator.
+/// Time for which SysTick feeds the watchdog after the main loop, s; the longest step, a channel's fit, takes 2.5 s in
+/// the emulator.
 const EXTENSION_S: u32 = 30;
 static FEEDINGS: AtomicU32 = AtomicU32::new(0);
 /// Readings of the crystal's flag, 100 ms at 12 MHz; it is set after 1 ms.
 const CRYSTAL_READINGS: u32 = 400_000;
-/// Alarm before the next attempt, half periods of the LED.
+/// Duration of the alarm before the next attempt, half periods of the LED.
 const ALARM_BLINKS: u32 = 80;
-/// 62 ms at 6.5 MHz, the typical ring oscillator (data sheet, 2.17).
+/// Half period of the alarm: 62 ms at 6.5 MHz, the typical ring oscillator (data sheet, 2.17).
 const ALARM_CYCLES: u32 = 400_000;
-/// 0.946 V of 1.1 V (data sheet, 2.10.6.1; 0.86 V after a reset).
+/// Brown-out level: 0.946 V of 1.1 V (data sheet, 2.10.6.1; 0.86 V after a reset).
 const BROWN_OUT_LEVEL: u8 = 0b1011;
 
 /// Reads the cause of the start (RP2040 data sheet, sections 2.10.6.2 and 4.7.6).
 pub fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> BootCause {
     let (reason, chip) = (watchdog.reason().read(), chip.chip_reset().read());
-    // The chip's flags ignore a watchdog reset; power-on and brown-out share one.
+    // The chip's flags do not show a watchdog reset; power-on and brown-out share one flag.
     if reason.timer().bit_is_set() {
         BootCause::Watchdog
     } else if reason.force().bit_is_set() {
@@ -50,7 +51,7 @@ pub fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> BootCause 
 /// An RP2040 with running clock and watchdog.
 pub struct Rp2040;
 
-/// The peripherals that clocks are made with.
+/// The peripherals from which the clocks are made.
 pub struct ClockParts {
     /// Crystal oscillator.
     pub crystal: XOSC,
@@ -63,7 +64,7 @@ pub struct ClockParts {
 }
 
 impl Rp2040 {
-    /// Starts the watchdog first, then clocks and microsecond counter; without the crystal the LED blinks fast.
+    /// Starts the watchdog first, then clocks and microsecond counter. Without the crystal the LED blinks fast.
     ///
     /// # Errors
     /// The crystal's frequency makes no clock.
@@ -74,9 +75,9 @@ impl Rp2040 {
         led: &mut impl StatefulOutputPin,
     ) -> Result<ClocksManager, InitError> {
         let mut watchdog = rp2040_hal::Watchdog::new(watchdog);
-        // By the ring oscillator until the crystal runs: 5.7 s or more.
+        // Until the crystal runs, the ring oscillator clocks the watchdog: 5.7 s or more.
         watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
-        // During a halt by a debugger.
+        // The watchdog pauses while a debugger halts the processor.
         watchdog.pause_on_debug(true);
         watchdog.start(WATCHDOG_MS.millis());
         chip.bod().modify(|_, w| {
@@ -98,7 +99,7 @@ impl Rp2040 {
     }
 }
 
-/// The HAL does so without a time limit.
+/// Waits for the crystal; the HAL would wait without a time limit.
 fn crystal_starts(crystal: &XOSC) -> bool {
     crystal.ctrl().write(|w| w.freq_range()._1_15mhz());
     crystal.ctrl().modify(|_, w| w.enable().enable());
@@ -119,7 +120,7 @@ impl Watchdog for Rp2040 {
     }
 }
 
-/// Falls by two a microsecond (erratum RP2040-E1).
+/// Reloads the watchdog, which falls by two a microsecond (erratum RP2040-E1).
 fn reload_watchdog() {
     // SAFETY: feeds the watchdog, and nothing else.
     unsafe { (*WATCHDOG::ptr()).load().write(|w| w.bits(2 * 1000 * WATCHDOG_MS)) };
@@ -136,7 +137,7 @@ impl Microcontroller for Rp2040 {
         }
     }
 
-    /// A core reset would not reset the peripherals.
+    /// The watchdog restarts, since a core reset would not reset the peripherals.
     fn restart() -> ! {
         // SAFETY: the write ends the program.
         unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.trigger().set_bit()) };
@@ -145,7 +146,7 @@ impl Microcontroller for Rp2040 {
         }
     }
 
-    /// As a drive and for picotool, without an activity LED.
+    /// The boot loader offers a drive and an interface for picotool, without an activity LED.
     fn start_boot_loader() -> ! {
         // SAFETY: the boot ROM, which does not feed the watchdog, takes over.
         unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.enable().clear_bit()) };

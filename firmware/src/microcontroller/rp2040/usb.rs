@@ -10,7 +10,7 @@ use rp2040_hal::usb::UsbBus;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::UsbVidPid;
 
-/// Raspberry Pi Pico SDK CDC UART (github.com/raspberrypi/usb-pid).
+/// Identification of the Raspberry Pi Pico SDK CDC UART (github.com/raspberrypi/usb-pid).
 const PRODUCT_ID: UsbVidPid = UsbVidPid(0x2E8A, 0x000A);
 
 /// The USB port, served in the interrupt USBCTRL_IRQ.
@@ -27,7 +27,7 @@ pub fn usb_port(
     UsbParts::start(bus, PRODUCT_ID, unique_id(), reconnect)
 }
 
-/// Takes the controller off the bus, or starts it as [`UsbBus::new`]; endpoints and address follow a bus reset.
+/// Takes the controller off the bus, or starts it as [`UsbBus::new`] does; endpoints and address follow a bus reset.
 fn reconnect(connected: bool) {
     // SAFETY: no other program part uses the reset of the controller, and the interrupt that uses the controller waits meanwhile.
     let (resets, controller) = unsafe { (&*RESETS::ptr(), &*USBCTRL_REGS::ptr()) };

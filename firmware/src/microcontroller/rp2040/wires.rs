@@ -1,4 +1,4 @@
-//! An RP2040 that is wired to the sensor as a Raspberry Pi Pico is: the pins, and the start of all that is connected to them.
+//! An RP2040 that is wired to the sensor as a Raspberry Pi Pico: its pins, and the start of the peripherals at them.
 //!
 //! | pin | signal | at the sensor |
 //! |---|---|---|
@@ -34,14 +34,14 @@ type Pin<I, F, P = PullDown> = gpio::Pin<I, F, P>;
 type SpiPins = (Pin<Gpio19, FunctionSpi>, Pin<Gpio16, FunctionSpi>, Pin<Gpio18, FunctionSpi>);
 /// SPI of the sensor.
 pub type SensorSpi0 = Spi0<SpiPins>;
-/// Its chip select.
+/// Chip select of the sensor.
 pub type Select = Pin<Gpio17, FunctionSioOutput>;
 /// The data-ready input.
 pub type DataReady = Pin<Gpio20, FunctionSioInput>;
 /// The serial port on pins.
 pub type Uart = Uart0Port<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart, PullUp>)>;
 
-/// Starts a board; `has_usb` starts USB, `has_reset_line` drives RST high.
+/// Starts a board. `has_usb` starts USB, `has_reset_line` drives RST high.
 pub fn start<B>(device: pac::Peripherals, queues: UartQueues, has_usb: bool, has_reset_line: bool) -> BoardParts<B>
 where
     B: BoardSupport<Microcontroller = Rp2040, DataReady = DataReady, Spi = SensorSpi0, Select = Select, Uart = Uart>,
@@ -50,7 +50,7 @@ where
     let mut resets = device.RESETS;
     let sio = Sio::new(device.SIO);
     let pins = gpio::Pins::new(device.IO_BANK0, device.PADS_BANK0, sio.gpio_bank0, &mut resets);
-    // Before SCK rises, which the sensor would take for an edge.
+    // Chip select must be high before SCK rises: the sensor would count that as a clock edge.
     let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
     let reset = pins.gpio21;
     let reset_line = has_reset_line.then(|| reset.into_push_pull_output_in_state(gpio::PinState::High).into_dyn_pin());
@@ -68,7 +68,7 @@ where
     let (peripheral, core_hz) = (clocks.peripheral_clock.freq(), clocks.system_clock.freq().to_Hz());
 
     let settings = uart::UartConfig::new(BAUD.Hz(), uart::DataBits::Eight, None, uart::StopBits::One);
-    // Idle if not connected.
+    // The pull-up makes an unconnected receiver idle.
     let lines = (pins.gpio0.into_function(), pins.gpio1.reconfigure());
     let serial = uart::UartPeripheral::new(device.UART0, lines, &mut resets)
         .enable(settings, peripheral)

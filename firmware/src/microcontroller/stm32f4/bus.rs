@@ -45,7 +45,7 @@ fn registers() -> &'static pac::spi1::RegisterBlock {
     unsafe { &*SPI1::ptr() }
 }
 
-/// Resets the peripherals on SPI1's bus.
+/// The register that resets peripherals on SPI1's bus.
 fn reset_register() -> &'static pac::rcc::APB2RSTR {
     // SAFETY: after the start only this module uses it.
     unsafe { (*RCC::ptr()).apb2rstr() }
@@ -71,7 +71,7 @@ impl SpiPeripheral for Spi1 {
         clock_hz
     }
 
-    /// BSY may stay set otherwise (ST, errata sheet ES0182, SPI).
+    /// BSY may stay set without a reset (ST, errata sheet ES0182, SPI).
     fn reset(&mut self) {
         let (spi, rcc) = (registers(), reset_register());
         let [control, control_2] = [spi.cr1().read().bits(), spi.cr2().read().bits()];
@@ -87,13 +87,13 @@ impl SpiPeripheral for Spi1 {
     fn drain(&mut self) {
         let _ended = wait_for(|| registers().sr().read().bsy().bit_is_clear());
         for _ in 0..STALE_BYTES {
-            // Clears an overrun (RM0090 section 28.3.10).
+            // This read clears an overrun (RM0090 section 28.3.10).
             registers().dr().read();
             registers().sr().read();
         }
     }
 
-    /// The end raises the interrupt DMA2_STREAM0.
+    /// The end of the transfer raises the interrupt DMA2_STREAM0.
     fn start(&mut self, request: &'static [u8], received: &mut [u8]) {
         let data = registers().dr().as_ptr() as u32;
         self.clear_flags();
@@ -116,7 +116,7 @@ impl SpiPeripheral for Spi1 {
         registers().cr2().modify(|_, w| w.rxdmaen().set_bit().txdmaen().set_bit());
     }
 
-    /// Disabling sets the completion flag too (RM0090 section 10.3.14): the rest decides.
+    /// Disabling a stream also sets its completion flag (RM0090 section 10.3.14), so the number of bytes left decides.
     fn stop(&mut self) -> bool {
         let flags = self.dma.lisr().read();
         let complete = flags.tcif0().bit_is_set() && flags.teif0().bit_is_clear() && flags.teif3().bit_is_clear();

@@ -6,14 +6,14 @@ use crate::bus_frame::wait_for;
 use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
 use stm32f4xx_hal::pac::{FLASH, flash::RegisterBlock};
 
-/// Programmed at once at 2.7 to 3.6 V (Table 7), and its PSIZE.
+/// Bytes programmed at once at 2.7 to 3.6 V (Table 7), and the PSIZE for it.
 const WORD: usize = 4;
 const PSIZE_32: u8 = 0b10;
-/// Together as large as one of 5 to 11 (Table 5).
+/// Number of sector 4: sectors 0 to 4 are together as large as each of sectors 5 to 11 (Table 5).
 const SECTORS_BEFORE: usize = 4;
-/// For FLASH_CR (section 3.6.1).
+/// Keys that unlock FLASH_CR (section 3.6.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// Waits of 0.4 ms; a sector takes 2 s, a word 0.1 ms (STM32F405 data sheet, flash memory programming).
+/// Number of waits of 0.4 ms; a sector takes 2 s, a word 0.1 ms (STM32F405 data sheet, flash memory programming).
 const WAITS: u32 = 10_000;
 
 /// The flash memory; sectors 0 to 4 are too short for settings.
@@ -49,7 +49,7 @@ impl FlashMemory for Stm32Flash {
     }
 }
 
-/// With the controller unlocked and errors cleared.
+/// Runs an operation with the controller unlocked and errors cleared.
 fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> Result<(), FlashError> {
     // SAFETY: after the start only the main loop uses the registers of the flash memory.
     let flash = unsafe { &*FLASH::ptr() };
@@ -63,7 +63,7 @@ fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> 
     flash.sr().modify(|r, w| unsafe { w.bits(r.bits()) });
     let done = if flash.cr().read().lock().bit_is_clear() { operation(flash) } else { Err(FlashError::Refused) };
     flash.cr().modify(|_, w| w.ser().clear_bit().pg().clear_bit().lock().set_bit());
-    // The cache is stale (section 3.5.2); it is emptied while off.
+    // The data cache is stale (section 3.5.2); it must be off while it is emptied.
     flash.acr().modify(|_, w| w.dcen().clear_bit());
     flash.acr().modify(|_, w| w.dcrst().set_bit());
     flash.acr().modify(|_, w| w.dcrst().clear_bit());

@@ -9,7 +9,7 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::Config;
 use stm32f4xx_hal::serial::{Instance, Rx, RxListen, Serial, Tx, TxISR, TxListen};
 
-/// 8N1.
+/// Baud rate; the format is 8N1.
 const BAUD: u32 = 460_800;
 
 /// A USART, served in its interrupt.
@@ -20,7 +20,7 @@ pub struct UsartPort<U: Instance> {
 }
 
 impl<U: Instance> UsartPort<U> {
-    /// Starts the port; a pulled-up receiver is idle if not connected.
+    /// Starts the port. The pull-up makes an unconnected receiver idle.
     pub fn new(
         usart: U,
         pins: (impl Into<U::Tx<PushPull>>, impl Into<U::Rx<PushPull>>),
@@ -37,7 +37,7 @@ impl<U: Instance> UsartPort<U> {
 
 impl<U: Instance> ServedPort for UsartPort<U> {
     fn serve(&mut self, _now_us: u32) -> u32 {
-        // An overrun also interrupts, and only a read clears it.
+        // An overrun also raises the interrupt, and only a read clears it.
         let lost = match self.rx.read() {
             Ok(byte) => self.queues.receive.push(Some(byte)),
             Err(nb::Error::Other(_)) => self.queues.receive.push(None),

@@ -15,24 +15,24 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Watchdog time by an oscillator of 32 kHz, 5.4 s at 47 kHz (STM32F405 data sheet, LSI); a report takes less.
+/// Time of the watchdog with an oscillator of 32 kHz, 5.4 s at 47 kHz (STM32F405 data sheet, LSI); a report takes less.
 const WATCHDOG_MS: u32 = 8_000;
-/// From crystal or internal oscillator.
+/// Clock of the processor, from crystal or internal oscillator.
 const CORE_HZ: u32 = 168_000_000;
-/// Both peripheral buses; from 84 MHz the slowest clock of SPI1 is 328 kHz, too fast for low-power mode.
+/// Clock of both peripheral buses; 84 MHz would make the slowest clock of SPI1 328 kHz, too fast for low-power mode.
 const PERIPHERAL_HZ: u32 = 42_000_000;
 /// Readings of the crystal's flag at 16 MHz: 100 ms.
 const CRYSTAL_READINGS: u32 = 550_000;
-/// Level 3, 2.7 V (RM0090 section 3.9.10); the definitions' names are reversed.
+/// Brown-out level 3, 2.7 V (RM0090 section 3.9.10); the names of the definitions are reversed.
 const BROWN_OUT_LEVEL_3: u8 = 0b00;
-/// For the option bytes (RM0090 section 3.7.2).
+/// Keys that unlock the option bytes (RM0090 section 3.7.2).
 const OPTION_KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
 
 /// Reads the cause of the start and clears the reset flags (RM0090 section 6.3.21).
 pub fn boot_cause(rcc: &RCC) -> BootCause {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    // Power-on also sets the brown-out flag, every reset the pin's.
+    // Power-on also sets the brown-out flag, and every reset the flag of the pin.
     if flags.porrstf().bit_is_set() {
         BootCause::PowerOn
     } else if flags.wdgrstf().bit_is_set() {
@@ -59,7 +59,7 @@ impl Watchdog for Stm32f4 {
 
 /// The result of a start.
 pub struct Started {
-    /// Why the microcontroller started.
+    /// Reason for which the microcontroller started.
     pub cause: BootCause,
     /// The source of the clocks.
     pub clock: ClockSource,
@@ -76,7 +76,7 @@ impl Stm32f4 {
         }
         IndependentWatchdog::new(watchdog).start(WATCHDOG_MS.millis());
         stop_watchdog_with_debugger();
-        // Option bytes are written only on request.
+        // The option bytes are written only on request.
         let programmed = flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3;
         defmt::info!("brown-out level of 2.7 V {=str}", if programmed { "set" } else { "not set: command brownout" });
         let clock = start_crystal(&rcc);
@@ -84,7 +84,7 @@ impl Stm32f4 {
             ClockSource::Crystal => Config::hse(crystal_hz.Hz()),
             ClockSource::Internal => Config::hsi(),
         };
-        // 48 MHz for USB.
+        // USB needs 48 MHz.
         let source = source.require_pll48clk();
         let config = source.sysclk(CORE_HZ.Hz()).pclk1(PERIPHERAL_HZ.Hz()).pclk2(PERIPHERAL_HZ.Hz());
         let mut rcc = rcc.freeze(config);
@@ -108,7 +108,7 @@ fn start_crystal(rcc: &RCC) -> ClockSource {
     }
 }
 
-/// DBG_IWDG_STOP (RM0090 section 38.16.4).
+/// Stops the watchdog while a debugger halts the processor: DBG_IWDG_STOP (RM0090 section 38.16.4).
 fn stop_watchdog_with_debugger() {
     // SAFETY: a register that nothing else uses.
     unsafe { (*DBGMCU::ptr()).apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit()) };
@@ -116,14 +116,15 @@ fn stop_watchdog_with_debugger() {
 
 #[unsafe(link_section = ".uninit.request")]
 static REQUEST: AtomicU32 = AtomicU32::new(0);
-/// Any number unlikely in memory.
+/// Value of [`REQUEST`] for the boot loader; any number that is unlikely in memory.
 const BOOT_LOADER_REQUEST: u32 = 0xB007_10AD;
-/// Boot loader, beginning with its vector table (RM0090 section 2.4; AN2606).
+/// The boot loader, which begins with its vector table (RM0090 section 2.4; AN2606).
 const SYSTEM_MEMORY: *const u32 = 0x1FFF_0000 as *const u32;
-/// Maps it to 0 (RM0090 section 9.2.1).
+/// The mode that maps the boot loader to address 0 (RM0090 section 9.2.1).
 const SYSTEM_MEMORY_AT_0: u8 = 0b01;
 
-/// As a reset with BOOT0 high: reset peripherals, no interrupts, system memory at address 0.
+/// Enters the boot loader as a reset with BOOT0 high does: reset peripherals, no interrupts, system memory at address
+/// 0.
 fn enter_boot_loader(rcc: &RCC) -> ! {
     REQUEST.store(0, Relaxed);
     rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
@@ -157,13 +158,14 @@ impl Microcontroller for Stm32f4 {
         SCB::sys_reset()
     }
 
-    /// At the next start, with everything as after a reset.
+    /// The boot loader is entered at the next start, when everything is as after a reset.
     fn start_boot_loader() -> ! {
         REQUEST.store(BOOT_LOADER_REQUEST, Relaxed);
         SCB::sys_reset()
     }
 
-    /// Brown-out level 3, 2.7 V for 168 MHz, in the option bytes (RM0090 sections 3.7.2 and 3.7.3); takes milliseconds.
+    /// Programs brown-out level 3, 2.7 V for 168 MHz, in the option bytes (RM0090 sections 3.7.2 and 3.7.3); takes
+    /// milliseconds.
     fn program_brown_out() -> BrownOutLevel {
         // SAFETY: only this function uses the flash memory's registers after the start.
         let flash = unsafe { &*FLASH::ptr() };

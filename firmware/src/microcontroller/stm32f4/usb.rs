@@ -9,11 +9,11 @@ use stm32f4xx_hal::rcc::Clocks;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::UsbVidPid;
 
-/// STMicroelectronics' virtual COM port.
+/// Identification of STMicroelectronics' virtual COM port.
 const PRODUCT_ID: UsbVidPid = UsbVidPid(0x0483, 0x5740);
-/// Words (RM0090 section 39.1).
+/// Unique number of the microcontroller, three words (RM0090 section 39.1).
 const UNIQUE_ID: *const [u32; 3] = 0x1FFF_7A10 as *const [u32; 3];
-/// A packet of 64 bytes for each of two receiving endpoints.
+/// Memory for a packet of 64 bytes for each of two receiving endpoints, words.
 const PACKET_WORDS: usize = 2 * 64 / 4;
 
 /// The USB port, served in the interrupt OTG_FS.
@@ -33,7 +33,7 @@ pub fn usb_port(
     UsbParts::start(bus, PRODUCT_ID, unique_id.into_iter().flat_map(u32::to_be_bytes), reconnect)
 }
 
-/// SDIS (RM0090 section 34.16.4); the host then resets the bus.
+/// Sets or clears SDIS (RM0090 section 34.16.4); the host then resets the bus.
 fn reconnect(connected: bool) {
     // SAFETY: the interrupt that uses the controller waits meanwhile.
     unsafe { (*OTG_FS_DEVICE::ptr()).dctl().modify(|_, w| w.sdis().bit(!connected)) };

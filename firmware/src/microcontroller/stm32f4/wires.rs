@@ -8,7 +8,7 @@ use stm32f4xx_hal::pac::{DMA2, EXTI, SPI1, SYSCFG};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 
-/// How the sensor is wired to a board.
+/// The wires of the sensor on a board.
 pub struct SensorWires<const P: char, const N: u8> {
     /// SPI1, and the controller of its DMA transfers.
     pub spi: (SPI1, DMA2),
@@ -16,7 +16,7 @@ pub struct SensorWires<const P: char, const N: u8> {
     pub pins: (PA4, PA5, PA6, PA7),
     /// The pin at DIO1.
     pub data_ready: Pin<P, N>,
-    /// The peripherals that make edges of that pin interrupts.
+    /// The peripherals that turn edges of that pin into interrupts.
     pub edges: (EXTI, SYSCFG),
 }
 
@@ -41,7 +41,7 @@ impl Started {
     }
 }
 
-/// Pulled down: no edges from an unplugged sensor.
+/// The data-ready input, pulled down, so that an unplugged sensor gives no edges.
 fn data_ready_input<const P: char, const N: u8>(
     pin: Pin<P, N>,
     (mut exti, syscfg): (EXTI, SYSCFG),

@@ -4,7 +4,7 @@ use super::noise::{RATE_HZ, TestNoise};
 use allan_core::{Cascade, Curve, Model, fit::fit};
 use std::ops::Range;
 
-/// A record fills those up to half its length.
+/// Number of octaves of the estimator; a record fills those up to half its length.
 const OCTAVES: usize = 24;
 
 /// Curve and model of one record.
@@ -12,7 +12,7 @@ const OCTAVES: usize = 24;
 pub struct EstimatedRecord {
     /// Allan variances in counts².
     pub curve: Curve<OCTAVES>,
-    /// Fitted to the curve; N, B and K in counts and seconds.
+    /// The model fitted to the curve, with N, B and K in counts and seconds.
     pub model: Model,
     pub samples: u64,
 }

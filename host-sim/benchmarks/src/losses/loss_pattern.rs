@@ -1,4 +1,4 @@
-//! The samples of a record that are lost.
+//! Patterns of lost samples in a record.
 
 use super::noise::RATE_HZ;
 use rand::{Rng, SeedableRng};
@@ -9,9 +9,9 @@ use std::ops::Range;
 /// A pattern of lost samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LossPattern {
-    /// With this probability per sample.
+    /// Each sample is lost with this probability.
     Random(f64),
-    /// 5 to 200 samples every 1 to 5 minutes, uniformly.
+    /// 5 to 200 samples are lost every 1 to 5 minutes, uniformly distributed.
     Bursts,
 }
 
@@ -20,7 +20,7 @@ impl LossPattern {
     pub const ALL: [Self; 5] =
         [Self::Random(0.0005), Self::Random(0.005), Self::Random(0.02), Self::Random(0.05), Self::Bursts];
 
-    /// Lost stretches, without the first and the last sample.
+    /// The lost samples; the first and the last sample of a record are kept.
     #[must_use]
     pub fn gaps(self, samples: usize, seed: u64) -> Vec<Range<usize>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,4 +1,4 @@
-//! The noises by definition: white noise and walk by sample, flicker noise by spectrum.
+//! The test noises, by their definitions: white noise and walk sample by sample, flicker noise by its spectrum.
 
 use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
 use allan_core::NoiseTerm;
@@ -9,26 +9,26 @@ use std::fmt;
 
 /// Samples per second of the simulated records.
 pub const RATE_HZ: f64 = 204.8;
-/// Two moving averages of eight values, as with SENS_AVG = 3.
+/// Taps of the filter: two moving averages of eight values, as with SENS_AVG = 3.
 const TAPS: u16 = 8;
 
-/// Counts per 0.05 °/s: rounding is negligible.
+/// Counts per 0.05 °/s, so many that rounding is negligible.
 const COUNTS: f64 = 64.0;
 
 /// A noise of the benchmark, in counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TestNoise {
     mixture: Mixture,
-    /// True behind the part's filter.
+    /// True if the noise has passed the part's filter.
     filtered: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mixture {
     White,
-    /// 0.0368 °/√s, 0.0093 °/s, 0.0013 °/s^1.5.
+    /// N, B and K of the published characterisation: 0.0368 °/√s, 0.0093 °/s, 0.0013 °/s^1.5.
     Paper,
-    /// White noise below, a walk above 32 samples.
+    /// White noise dominates below 32 samples, a walk above.
     Walk,
 }
 
@@ -56,12 +56,12 @@ impl TestNoise {
         match self.mixture {
             Mixture::White => Coefficients { n, b: 0.0, k: 0.0 },
             Mixture::Paper => Coefficients { n, b: 0.0093 / lsb, k: 0.0013 / lsb },
-            // N²/τ = K²τ/3 at 32 samples.
+            // N²/τ equals K²τ/3 at 32 samples.
             Mixture::Walk => Coefficients { n, b: 0.0, k: 3.0_f64.sqrt() * n * RATE_HZ / 32.0 },
         }
     }
 
-    /// In the order of [`truth`](Self::truth).
+    /// The terms of the noise, in the order of [`truth`](Self::truth).
     #[must_use]
     pub fn terms(self) -> &'static [NoiseTerm] {
         const FILTERED: NoiseTerm = NoiseTerm::Filtered(MovingAverageFilter::bartlett(TAPS));
@@ -76,13 +76,14 @@ impl TestNoise {
         }
     }
 
-    /// Shortest averaging factor of the fit: four filter lengths, as flicker noise and walk ignore the filter.
+    /// Shortest averaging factor of the fit: four filter lengths, since flicker noise and walk do not pass the filter
+    /// here.
     #[must_use]
     pub fn shortest_fitted(self) -> u64 {
         if self.filtered { 8 * u64::from(TAPS) } else { 1 }
     }
 
-    /// With symbols, in counts and seconds.
+    /// The true coefficients with their symbols, in counts and seconds.
     #[must_use]
     pub fn truth(self) -> Vec<(&'static str, f64)> {
         let Coefficients { n, b, k } = self.coefficients();

@@ -1,17 +1,16 @@
-//! Comparison of the complete records with those that have lost samples.
+//! Complete records compared with records that have lost samples.
 
 use super::estimate::EstimatedRecord;
 use super::loss_pattern::LossPattern;
-use super::noise::{RATE_HZ, TestNoise};
-use reports::formatting::{TextTable, number};
+use super::noise::TestNoise;
 use serde::{Serialize, Serializer};
 use statrs::statistics::Statistics;
-use std::io::{self, Write};
 
 /// The results for every noise and every loss.
 #[derive(Debug, Clone, Serialize)]
 pub struct LossTable {
     pub records: u64,
+    pub rate_hz: f64,
     pub samples: usize,
     pub comparisons: Vec<LossComparison>,
 }
@@ -23,12 +22,12 @@ pub struct LossComparison {
     pub noise: TestNoise,
     #[serde(serialize_with = "as_text")]
     pub loss: LossPattern,
-    /// Lost share of all samples.
+    /// Lost fraction of all samples.
     pub lost: f64,
-    /// Records that keep the longest averaging time.
+    /// Number of records that keep the longest averaging time.
     pub same_longest: usize,
     pub octaves: Vec<OctaveRatio>,
-    /// N, B and K, if the noise has them.
+    /// Comparisons of N, B and K, if the noise has them.
     pub coefficients: Vec<CoefficientComparison>,
 }
 
@@ -38,7 +37,7 @@ pub struct OctaveRatio {
     pub n: u64,
     /// Ratio of mean variances, less 1.
     pub bias: f64,
-    /// By the scatter of the differences.
+    /// Standard error of the bias, from the scatter of the differences.
     pub standard_error: f64,
     /// Bias without the correction for interpolation.
     pub uncorrected: f64,
@@ -46,20 +45,20 @@ pub struct OctaveRatio {
     pub edf: f64,
 }
 
-/// One fitted coefficient; behind the filter from four filter lengths on.
+/// One fitted coefficient. Behind the filter the fit begins at four filter lengths.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoefficientComparison {
     pub symbol: &'static str,
-    /// Complete records: mean over truth, less 1.
+    /// Bias in complete records: mean over truth, less 1.
     pub complete_bias: f64,
-    /// Complete records: standard deviation over truth.
+    /// Scatter in complete records: standard deviation over truth.
     pub scatter: f64,
-    /// Mean difference by the losses, over truth.
+    /// Mean difference caused by the losses, over truth.
     pub shift: f64,
     pub standard_error: f64,
-    /// Records whose 95 % interval contains the truth.
+    /// Number of records whose 95 % interval contains the truth.
     pub covered: usize,
-    /// Complete records of that kind.
+    /// Number of complete records whose 95 % interval contains the truth.
     pub complete_covered: usize,
 }
 
@@ -68,7 +67,7 @@ fn as_text<S: Serializer>(value: &impl ToString, serializer: S) -> Result<S::Ok,
 }
 
 impl LossComparison {
-    /// Compares pairs of a complete record and the same with losses.
+    /// Compares pairs of a complete record and the same record with losses.
     #[must_use]
     pub fn new(noise: TestNoise, loss: LossPattern, pairs: &[(&EstimatedRecord, &EstimatedRecord)]) -> Self {
         let total = |of: fn(&(&EstimatedRecord, &EstimatedRecord)) -> u64| pairs.iter().map(of).sum::<u64>() as f64;
@@ -133,71 +132,4 @@ impl CoefficientComparison {
 
 fn standard_error(values: &[f64]) -> f64 {
     values.iter().std_dev() / (values.len() as f64).sqrt()
-}
-
-const RANGES: [(&str, u64, u64); 4] =
-    [("1 … 4", 1, 4), ("8 … 512", 8, 512), ("1,024 … 8,192", 1024, 8192), ("above", 8193, u64::MAX)];
-
-impl LossTable {
-    /// Writes two tables as text: the variances, then the coefficients.
-    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let hours = self.samples as f64 / RATE_HZ / 3600.0;
-        writeln!(out, "{} records of {hours:.2} h at {RATE_HZ} SPS for each noise\n", self.records)?;
-        writeln!(
-            out,
-            "variance over that of the complete record, minus 1, in %: the octave that is farthest from 0, and its"
-        )?;
-        writeln!(
-            out,
-            "standard error; in brackets without the correction; smallest degrees of freedom over the complete ones"
-        )?;
-        let row = |comparison: &LossComparison| {
-            let mut cells = vec![
-                comparison.noise.to_string(),
-                comparison.loss.to_string(),
-                format!("{:.2}", 100.0 * comparison.lost),
-                format!("{}", comparison.same_longest),
-            ];
-            for (_, from, to) in RANGES {
-                let octaves = comparison.octaves.iter().filter(|octave| (from..=to).contains(&octave.n));
-                let weight = |octave: &OctaveRatio| {
-                    if to == u64::MAX { (octave.bias / octave.standard_error).abs() } else { octave.bias.abs() }
-                };
-                let worst = octaves.clone().max_by(|a, b| weight(a).total_cmp(&weight(b)));
-                let edf = octaves.map(|octave| octave.edf).fold(f64::INFINITY, f64::min);
-                cells.push(worst.map_or_else(String::new, |worst| {
-                    let [bias, error, uncorrected] =
-                        [worst.bias, worst.standard_error, worst.uncorrected].map(|share| 100.0 * share);
-                    format!("{bias:+.2} ± {error:.2} ({uncorrected:+.2}) {edf:.3}")
-                }));
-            }
-            cells
-        };
-        let header = ["noise", "lost", "%", "same longest τ"].into_iter().chain(RANGES.map(|(name, ..)| name));
-        writeln!(out, "{}\n", TextTable::new(header, 2, self.comparisons.iter().map(row)))?;
-        writeln!(
-            out,
-            "fitted coefficients, % of the truth: what the losses change ± its standard error, scatter and bias"
-        )?;
-        writeln!(
-            out,
-            "of the complete records; records of which the 95 % interval holds the truth, with and without losses"
-        )?;
-        let rows = self.comparisons.iter().flat_map(|comparison| {
-            comparison.coefficients.iter().map(|coefficient| {
-                vec![
-                    comparison.noise.to_string(),
-                    comparison.loss.to_string(),
-                    coefficient.symbol.to_owned(),
-                    format!("{:+.3} ± {:.3}", 100.0 * coefficient.shift, 100.0 * coefficient.standard_error),
-                    number(100.0 * coefficient.scatter),
-                    format!("{:+.2}", 100.0 * coefficient.complete_bias),
-                    coefficient.covered.to_string(),
-                    coefficient.complete_covered.to_string(),
-                ]
-            })
-        });
-        let header = ["noise", "lost", "", "change", "scatter", "bias", "hold", "complete"];
-        writeln!(out, "{}", TextTable::new(header, 3, rows))
-    }
 }

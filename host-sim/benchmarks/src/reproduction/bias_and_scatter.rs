@@ -1,12 +1,13 @@
-//! Bias and scatter of slope method and fit over simulated hours.
+//! Bias and scatter of the slope method and the fit over simulated hours.
 
 use super::four_methods::FourMethods;
 use super::published_gyro::{
-    OCTAVES, RATE_HZ, SAMPLES, TRUTH, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,
-    true_model,
+    INTERVALS, OCTAVES, RATE_HZ, SAMPLES, TRUTH, allan_curve, deviations, fitted_terms, simulate_counts,
+    slope_coefficients, true_model,
 };
 use allan_core::{AllanPoint, Cascade, Model, NoiseTerm, fit::fit};
 use serde::Serialize;
+use std::ops::RangeInclusive;
 
 /// Seeds of the simulated hours.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +16,7 @@ pub struct Reproduction {
     pub first_seed: u64,
 }
 
-/// Over the seeds, as fractions of the truth.
+/// Error over the seeds, as fractions of the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RelativeError {
     /// Mean over truth, less 1.
@@ -32,9 +33,9 @@ pub struct OctaveScatter {
     pub formula: f64,
     /// Predicted for the overlapped estimate, `1/√(2·edf)`.
     pub confidence: f64,
-    /// Over the seeds, without overlap.
+    /// Measured over the seeds, without overlap.
     pub plain: f64,
-    /// Over the seeds, with 8-fold overlap.
+    /// Measured over the seeds, with 8-fold overlap.
     pub overlapped: f64,
     /// Fractions of N, B and K in the true Allan variance before the filter.
     pub shares: [f64; 3],
@@ -44,15 +45,19 @@ pub struct OctaveScatter {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReproductionResult {
     pub seeds: u64,
-    /// Slope method on the true curve: inherent error.
+    /// N, °/√s, B, °/s, and K, °/s^1.5.
+    pub truth: [f64; 3],
+    /// Averaging times from which the slope method takes each of them, s.
+    pub intervals_s: [RangeInclusive<f64>; 3],
+    /// Bias of the slope method on the true curve: its inherent error.
     pub inherent: [f64; 3],
-    /// Slope method without overlap, as in the paper.
+    /// Error of the slope method without overlap, as in the paper.
     pub plain: [RelativeError; 3],
-    /// Slope method with 8-fold overlap.
+    /// Error of the slope method with 8-fold overlap.
     pub overlapped: [RelativeError; 3],
-    /// Fit with 8-fold overlap.
+    /// Error of the fit with 8-fold overlap.
     pub fitted: [RelativeError; 3],
-    /// Fraction of seeds with the truth in the 95 % bounds of the fit.
+    /// Fraction of seeds for which the 95 % bounds of the fit contain the truth.
     pub covered: [f64; 3],
     pub scatter: Vec<OctaveScatter>,
     pub four_methods: FourMethods,
@@ -83,6 +88,8 @@ impl Reproduction {
         let inherent = slope_coefficients(octaves.clone().map(|n| (tau(n), truth.avar(n).sqrt())));
         ReproductionResult {
             seeds: self.seeds,
+            truth: TRUTH,
+            intervals_s: INTERVALS,
             inherent: relative_errors(inherent),
             plain: each(|term| error_over(&hours, |hour| hour.slopes[0][term] / TRUTH[term])),
             overlapped: each(|term| error_over(&hours, |hour| hour.slopes[1][term] / TRUTH[term])),
@@ -112,7 +119,7 @@ fn unfiltered(n: u64) -> f64 {
     NoiseTerm::BASELINE.iter().zip(TRUTH).map(|(kind, value)| value * value * kind.avar(n, 1.0 / RATE_HZ)).sum()
 }
 
-/// By the degrees of freedom of the true model.
+/// Relative standard deviation `1/√(2·edf)` at an octave, by the degrees of freedom of the true model.
 fn confidence(truth: &Model, octave: usize) -> f64 {
     let mut cascade = Cascade::<OCTAVES, 8>::new();
     cascade.push_slice(&vec![0; SAMPLES as usize]);

@@ -12,13 +12,13 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::{E, PI};
 
-/// 640 s: ten overlapping segments.
+/// Samples of a segment of the spectrum: 640 s, so that ten overlapping segments fit the record.
 const SEGMENT: usize = 1 << 17;
-/// Segment length over the largest averaging time: the peak of the integrand, 0.37/τ, is at the sixth point.
+/// Segment length over the largest averaging time. The peak of the integrand, 0.37/τ, is then at the sixth point.
 const SEGMENT_PER_TAU: f64 = 16.0;
-/// Lags, samples, beyond the filtered white noise.
+/// Lags in samples beyond the filtered white noise.
 const SLOW_LAGS: std::ops::Range<usize> = 8..64;
-/// Parts that give the bounds of the autocorrelation method.
+/// Number of parts that give the bounds of the autocorrelation method.
 const PARTS: usize = 16;
 
 /// N, B and K by one method, in deg/√s, deg/s and deg/s^1.5, if it gives them.
@@ -34,7 +34,7 @@ pub struct MethodCoefficients {
 pub struct Autocorrelation {
     /// Variance of the samples, (deg/s)².
     pub variance: f64,
-    /// White part, (deg/s)²: variance less the autocovariance at lags 8 to 63.
+    /// Variance of the white part, (deg/s)²: the variance less the autocovariance at lags 8 to 63.
     pub white_variance: f64,
     /// Lag, s, at which the autocovariance of 1 s means is 1/e of that at 1 s.
     pub decay_s: Option<f64>,
@@ -49,25 +49,25 @@ pub struct SpectrumOctave {
     pub measured: f64,
     /// Allan deviation by equation (5), deg/s.
     pub by_spectrum: f64,
-    /// Relative, by degrees of freedom of the true model.
+    /// Relative standard error, by the degrees of freedom of the true model.
     pub measured_error: f64,
-    /// Relative, by degrees of freedom of the spectrum.
+    /// Relative standard error, by the degrees of freedom of the spectrum.
     pub by_spectrum_error: f64,
-    /// True if the segments are long enough.
+    /// True if the segments are long enough for this averaging time.
     pub resolved: bool,
 }
 
-/// Kalman innovations on the second half.
+/// Test of the Kalman filter's innovations on the second half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InnovationTest {
     pub model: &'static str,
-    /// Mean squared innovations over expectation.
+    /// Mean squared innovation over its expectation.
     pub normalised: f64,
-    /// 95 % of true models.
+    /// Interval that contains `normalised` for 95 % of true models.
     pub consistent: (f64, f64),
     /// Correlation of neighbouring innovations.
     pub correlation: f64,
-    /// Ljung-Box over 20 lags.
+    /// p-value of the Ljung-Box test over 20 lags.
     pub whiteness_p: f64,
 }
 
@@ -126,21 +126,22 @@ fn fitted_coefficients(model: &Model) -> MethodCoefficients {
     }
 }
 
-/// Mean product at a distance, less the squared mean.
+/// Mean product of two values `lag` apart, less the squared mean.
 fn autocovariance(values: &[f64], lag: usize) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let products = values.iter().zip(&values[lag..]).map(|(a, b)| (a - mean) * (b - mean));
     products.sum::<f64>() / (values.len() - lag) as f64
 }
 
-/// From lag 0 on, less the mean in [`SLOW_LAGS`]: slow noise changes by less than 0.1 % within 64 samples.
+/// Autocovariances from lag 0 on, less their mean in [`SLOW_LAGS`]: slow noise changes by less than 0.1 % within 64
+/// samples.
 fn white_autocovariances(samples: &[f64]) -> Vec<f64> {
     let slow = SLOW_LAGS.map(|lag| autocovariance(samples, lag)).sum::<f64>() / SLOW_LAGS.len() as f64;
     (0..2 * usize::from(TAPS) - 1).map(|lag| autocovariance(samples, lag) - slow).collect()
 }
 
-/// N by the autocorrelation. The autocovariances of filtered white noise below lag `2·TAPS − 1` add up to `N²·RATE_HZ`;
-/// rounding adds `LSB²/12` at lag 0. Bounds by Student's distribution over [`PARTS`].
+/// N by the autocorrelation. The autocovariances of filtered white noise below lag `2·TAPS − 1` sum to `N²·RATE_HZ`,
+/// and rounding adds `LSB²/12` at lag 0. The bounds are by Student's distribution over [`PARTS`].
 fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
     let coefficient = |part: &[f64]| {
         let covariances = white_autocovariances(part);
@@ -176,7 +177,8 @@ fn autocorrelation(samples: &[f64]) -> Autocorrelation {
     }
 }
 
-/// N, B and K by the spectrum's fitted shape. B and K are `None` below 1 % at one cycle per segment.
+/// N, B and K by the fitted shape of the spectrum. B and K are `None` if they have less than 1 % at one cycle per
+/// segment.
 fn spectral_coefficients(welch: &Welch) -> MethodCoefficients {
     let (shape, bands) = welch.shape(|_| false);
     let n = shape.angle_random_walk();
@@ -192,8 +194,8 @@ fn spectral_coefficients(welch: &Welch) -> MethodCoefficients {
 
 /// Weight of the one-sided density at `frequency` in the Allan variance at the averaging factor `n`.
 ///
-/// Equation (5) has the two-sided density, so the factor is 2. A mean of `n` samples has sin(πfτ)/(n·sin(πf/RATE_HZ)),
-/// and the samples' density includes aliases.
+/// The factor is 2, since equation (5) has the two-sided density. A mean of `n` samples has
+/// sin(πfτ)/(n·sin(πf/RATE_HZ)), and the density of the samples includes aliases.
 #[must_use]
 pub fn allan_weight(frequency: f64, n: u64) -> f64 {
     let phase = PI * frequency / RATE_HZ;
@@ -202,7 +204,7 @@ pub fn allan_weight(frequency: f64, n: u64) -> f64 {
 }
 
 fn spectrum_octaves(welch: &Welch, curve: &Curve<OCTAVES>) -> Vec<SpectrumOctave> {
-    // Correlations of (2/3)² and (1/6)² under a Hann window.
+    // The correlations of neighbouring ordinates under a Hann window are (2/3)² and (1/6)².
     const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
     let (segment_s, truth) = (SEGMENT as f64 / RATE_HZ, true_model());
     let octave = |point: &allan_core::AllanPoint| {

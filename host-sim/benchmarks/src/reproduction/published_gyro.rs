@@ -9,8 +9,6 @@ use virtual_sensor::{NoiseModel, OutputRegister, VirtualAdis16405};
 
 /// N in deg/√s, B in deg/s and K in deg/s^1.5 of gyro z, as printed in the paper.
 pub const TRUTH: [f64; 3] = [0.0368, 0.0093, 0.0013];
-/// Symbols of the coefficients, in the order of [`TRUTH`].
-pub const SYMBOLS: [&str; 3] = ["N", "B", "K"];
 /// Sample rate, Hz.
 pub const RATE_HZ: f64 = 204.8;
 /// Length of the record, s.
@@ -21,10 +19,10 @@ pub(super) const OCTAVES: usize = 20;
 pub(super) const LSB: f64 = Channel::GyroZ.lsb(GyroRange::Dps300);
 /// Taps of each of the two averages of the sensor's default filter.
 pub(super) const TAPS: u16 = 4;
-/// SPI word: 7 to SMPL_PRD, 8 ticks of 1/1638.4 s.
+/// SPI word that writes 7 to SMPL_PRD: 8 ticks of 1/1638.4 s.
 const WRITE_SAMPLE_PERIOD: u16 = 0xB607;
 
-/// Default filter, ±300 °/s; counts of [`LSB`].
+/// Counts of [`LSB`] with the default filter at ±300 °/s.
 pub(super) fn simulate_counts(seed: u64) -> Vec<i32> {
     let mut noise = NoiseModel::noiseless();
     let gyro = noise.channel_mut(OutputRegister::GyroZ);
@@ -40,14 +38,14 @@ pub(super) fn simulate_counts(seed: u64) -> Vec<i32> {
     (0..SAMPLES).map(|_| next()).collect()
 }
 
-/// In deg/s.
+/// The Allan variance curve of the counts, deg/s.
 pub(super) fn allan_curve<const OVERLAP: usize>(counts: &[i32]) -> Curve<OCTAVES> {
     let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
     cascade.push_slice(counts);
     cascade.curve(1.0 / RATE_HZ).scaled(LSB)
 }
 
-/// N behind the filter, B, K, and the rounding, white behind the filter.
+/// The fitted terms: N behind the filter, B, K, and the rounding as white noise.
 pub(super) fn fitted_terms() -> [NoiseTerm; 4] {
     [
         NoiseTerm::Filtered(MovingAverageFilter::bartlett(TAPS)),
@@ -57,7 +55,7 @@ pub(super) fn fitted_terms() -> [NoiseTerm; 4] {
     ]
 }
 
-/// [`TRUTH`], and the rounding as N of `LSB·√(1/(12·RATE_HZ))`.
+/// The model of [`TRUTH`], with the rounding as N of `LSB·√(1/(12·RATE_HZ))`.
 pub(super) fn true_model() -> Model {
     let rounding = LSB * (1.0 / RATE_HZ / 12.0).sqrt();
     let terms = fitted_terms()
@@ -67,14 +65,15 @@ pub(super) fn true_model() -> Model {
     Model::new(1.0 / RATE_HZ, terms)
 }
 
-/// Averaging times, s, of the slopes −½, 0 and +½ in the paper.
+/// Averaging times for the slopes −½, 0 and +½ in the paper, s.
 pub const INTERVALS: [RangeInclusive<f64>; 3] = [0.125..=2.0, 32.0..=128.0, 120.0..=230.0];
 
-/// N, B and K by equations (7) to (9) of the paper: lines at 1 s, flat over 0.664, at 3 s, fitted to the logarithms.
-/// `points` are averaging times, s, and Allan deviations; `None` without a point.
+/// N, B and K by equations (7) to (9) of the paper, fitted to the logarithms: a line read at 1 s, a flat minimum over
+/// 0.664, a line read at 3 s. `points` are averaging times in s with Allan deviations. A coefficient is `None` if no
+/// point is in its interval.
 #[must_use]
 pub fn slope_coefficients(points: impl Iterator<Item = (f64, f64)> + Clone) -> [Option<f64>; 3] {
-    // Allan deviation at τ to coefficient.
+    // These factors convert an Allan deviation at τ to a coefficient.
     let factors: [fn(f64) -> f64; 3] = [f64::sqrt, |_| (PI / (2.0 * LN_2)).sqrt(), |tau| (3.0 / tau).sqrt()];
     let mut factors = factors.into_iter();
     INTERVALS.map(|interval| {

@@ -1,4 +1,4 @@
-//! Covariance of block means, and the tests of a waveform of the bias: expected log likelihood ratio, p-value.
+//! Covariance of block means, and tests of a waveform of the bias: expected log likelihood ratio and p-value.
 
 use super::channel_under_test::{Densities, fit_baseline};
 use super::environment::EnvironmentCourse;
@@ -9,12 +9,12 @@ use std::f64::consts::{PI, TAU};
 
 /// Blocks per record; faster waveforms are not tested here.
 pub(super) const BLOCKS: usize = 128;
-/// Highest summed frequency of flicker noise, periods per record.
+/// Highest frequency in the sum of flicker noise, periods per record.
 const HIGHEST: usize = 8 * BLOCKS;
-/// Lowest frequency 1/2 period per record: the generator's record is longer.
+/// Lowest frequency is 1/2 period per record, since the generator's record is longer.
 const SUBDIVISION: usize = 2;
 
-/// Per unit of the coefficients.
+/// Covariances of block means per unit of the squared coefficients.
 pub(super) struct BlockNoises {
     block_s: f64,
     flicker: DMatrix<f64>,
@@ -27,7 +27,7 @@ pub(super) struct BlockNoise<'a> {
     pub(super) flicker: f64,
     /// K, unit/√s.
     pub(super) walk: f64,
-    /// Time constant, s, and variance of each.
+    /// Time constant in s and variance of each Gauss-Markov process.
     pub(super) processes: &'a [(f64, f64)],
 }
 
@@ -52,7 +52,7 @@ impl BlockNoises {
         let block_s = self.block_s;
         let entry = |i: usize, j: usize| {
             let white = if i == j { noise.white / block_s } else { 0.0 };
-            // Variance in the middle of the earlier block.
+            // The variance is that in the middle of the earlier block.
             let walk = match i == j {
                 true => i as f64 + 1.0 / 3.0,
                 false => i.min(j) as f64 + 0.5,
@@ -67,7 +67,8 @@ impl BlockNoises {
     }
 }
 
-/// Covariance of means over blocks `lag` apart, `length` correlation times each, in a process of variance 1.
+/// Covariance of means over two blocks `lag` blocks apart, each `length` correlation times long, in a process of
+/// variance 1.
 fn exponential(length: f64, lag: usize) -> f64 {
     let decay = (-length).exp();
     match lag {
@@ -78,8 +79,8 @@ fn exponential(length: f64, lag: usize) -> f64 {
 
 /// Expected log likelihood ratio of a waveform in N, B and K against a constant with the best N, B and K.
 ///
-/// Per cosine of the blocks (Whittle), with the variance `c`, the waveform's share `s`, and `m` without it: `½·((c +
-/// s²)/m − 1 + ln(m/c))`.
+/// Each cosine of the blocks contributes `½·((c + s²)/m − 1 + ln(m/c))` (Whittle), with the variance `c`, the
+/// waveform's part `s`, and the variance `m` of the model without it.
 pub(super) struct WaveformTest {
     cosines: DMatrix<f64>,
     densities: Vec<Densities>,
@@ -87,7 +88,7 @@ pub(super) struct WaveformTest {
 }
 
 impl WaveformTest {
-    /// `squares` are N², B² and K² of `noise`; its other white noise and processes are known.
+    /// A test for `noise`. `squares` are its N², B² and K²; its other white noise and its processes are known.
     pub(super) fn new(noise: &BlockNoise, squares: [f64; 3], noises: &BlockNoises) -> Self {
         let cosines = cosines();
         let variances = |noise: &BlockNoise| cosine_variances(&cosines, &noises.covariance(noise));
@@ -115,7 +116,7 @@ impl WaveformTest {
     }
 }
 
-/// Cosines of 1, 2, … half periods, normalised, in columns.
+/// Normalised cosines of 1, 2, … half periods, in columns.
 fn cosines() -> DMatrix<f64> {
     let length = (2.0 / BLOCKS as f64).sqrt();
     DMatrix::from_fn(BLOCKS, BLOCKS - 1, |block, k| {
@@ -128,7 +129,7 @@ fn cosine_variances(cosines: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Vec<f6
     (0..cosines.ncols()).map(|k| cosines.column(k).dot(&weighted.column(k))).collect()
 }
 
-/// `sᵀC⁻¹s` of a waveform `s` beside a constant.
+/// `sᵀC⁻¹s` of a waveform `s` beside a free constant.
 fn energy(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> f64 {
     let ones = DVector::from_element(values.len(), 1.0);
     let weighted = factor.solve(&ones);
@@ -136,11 +137,11 @@ fn energy(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> f64 {
     values.dot(&factor.solve(values)) - along * along / weighted.dot(&ones)
 }
 
-/// p-value of `shape` in block `means` by the likelihood ratio with free noises (χ²); `white` is known.
+/// p-value of `shape` in the block `means` by the likelihood ratio with free noises (χ²); `white` is known.
 pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white: f64) -> f64 {
     let (means, shape) = (DVector::from_column_slice(means), DVector::from_column_slice(shape));
     let ones = DVector::from_element(means.len(), 1.0);
-    // Over the white variance.
+    // The ratios are relative to the white variance.
     let ratios = || (-2..=12).map(|power| if power == -2 { 0.0 } else { 4f64.powi(power - 4) });
     let mut best = [f64::INFINITY; 2];
     for flicker in ratios() {
@@ -154,7 +155,7 @@ pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white:
             };
             let Some(factor) = noises.covariance(&noise).cholesky() else { continue };
             let logarithm = 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>();
-            // Constant alone, and constant with waveform.
+            // The models are a constant alone, and a constant with the waveform.
             let (a, b) = (factor.solve(&ones), factor.solve(&shape));
             let rest = means.dot(&factor.solve(&means)) - a.dot(&means).powi(2) / a.dot(&ones);
             let (along, length) =
@@ -192,11 +193,11 @@ mod tests {
         let covariance = &noises.flicker;
         let allan = covariance[(0, 0)] - covariance[(0, 1)];
         let expected = 2.0 * std::f64::consts::LN_2 / PI;
-        // Frequencies beyond 8 periods a block hold a few thousandths.
+        // Frequencies beyond 8 periods per block contribute a few thousandths.
         assert!((allan / expected - 1.0).abs() < 0.01, "{allan}, {expected}");
     }
 
-    /// K²·τ/3, and a Gauss-Markov process of long correlation time.
+    /// A walk has K²·τ/3; the Gauss-Markov process has a long correlation time.
     #[test]
     fn walk_and_process_have_their_allan_variances() {
         let noises = BlockNoises::new(1280.0);
@@ -207,11 +208,11 @@ mod tests {
             0.5 * (c[(4, 4)] + c[(5, 5)] - 2.0 * c[(4, 5)])
         };
         assert!((allan(noise(0.3, &[])) / (0.09 * 10.0 / 3.0) - 1.0).abs() < 1e-9);
-        // 2σ²τ/(3T) in first order of τ/T.
+        // The process has 2σ²τ/(3T) in first order of τ/T.
         assert!((allan(noise(0.0, &[(1e5, 2.0)])) / (2.0 * 2.0 / 3.0 * 1e-4) - 1.0).abs() < 1e-3);
     }
 
-    /// The mean of 40 is ½ ± 0.046.
+    /// The mean of 40 p-values is ½ ± 0.046.
     #[test]
     fn the_test_of_a_waveform_keeps_its_level() {
         let noises = BlockNoises::new(BLOCKS as f64);
@@ -224,7 +225,7 @@ mod tests {
         };
         let mean = (0..40).map(|seed| p_of_seed(seed, 0.0)).sum::<f64>() / 40.0;
         assert!((mean - 0.5).abs() < 4.0 * 0.046, "{mean}");
-        // 128³/12·slope² = 29² standard deviations.
+        // The ramp has 128³/12·slope² = 29² standard deviations.
         assert!(p_of_seed(1, 0.07) < 2e-4, "{}", p_of_seed(1, 0.07));
     }
 }

@@ -5,17 +5,17 @@ use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister};
 
-/// Iterations, halvings, and longest step in ln of the squares.
+/// Limits of the fit: iterations, halvings, and the longest step in ln of the squares.
 const ITERATIONS: usize = 100;
 const HALVINGS: i32 = 12;
 const STEP: f64 = 3.0;
 const CONVERGED: f64 = 1e-3;
 const START: f64 = 0.01;
-/// Regularisation, as a part of all information.
+/// Regularisation, as a fraction of the total information.
 const LEAST_INFORMATION: f64 = 1e-9;
 const GRID: usize = 1500;
 const LONGEST_FILTER_LOG2: u32 = 6;
-/// Least gain in divisions, for the nulls; otherwise it falls to 10⁻⁷.
+/// Least gain for divisions. At the nulls the gain would be 0; elsewhere it is at least 10⁻⁷.
 const LEAST_GAIN: f64 = 1e-9;
 
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +30,7 @@ impl RecordLength {
     }
 }
 
-/// Two-sided density of N, B and K, sampled, unit²/Hz; `white_gain` is the white noise's filter.
+/// Two-sided density of sampled N, B and K, unit²/Hz; `white_gain` is the power gain of the white noise's filter.
 pub(super) fn baseline_density(noise: &ChannelNoise, white_gain: f64, period_s: f64, frequency: f64) -> f64 {
     let [white, flicker, walk] = baseline_densities(period_s, frequency);
     noise.angle_random_walk.powi(2) * white_gain * white
@@ -38,9 +38,9 @@ pub(super) fn baseline_density(noise: &ChannelNoise, white_gain: f64, period_s: 
         + noise.rate_random_walk.powi(2) * walk
 }
 
-/// Two-sided densities of N, B and K of 1.
+/// Two-sided densities of N, B and K for coefficients of 1.
 pub(super) fn baseline_densities(period_s: f64, frequency: f64) -> [f64; 3] {
-    // Half of the one-sided B²/(πf).
+    // The flicker density is half of the one-sided B²/(πf).
     [1.0, 0.5 / (PI * frequency), (period_s / (2.0 * (PI * frequency * period_s).sin())).powi(2)]
 }
 
@@ -57,27 +57,27 @@ pub(super) fn resonance_density(centre_hz: f64, bandwidth_hz: f64, period_s: f64
     0.5 * (side(frequency - centre_hz) + side(frequency + centre_hz))
 }
 
-/// Two-sided density of a rate differenced from an angle with white error of deviation 1.
+/// Two-sided density of the rate that is the difference of an angle with a white error of deviation 1.
 pub(super) fn quantization_density(period_s: f64, frequency: f64) -> f64 {
     4.0 * (PI * frequency * period_s).sin().powi(2) / period_s
 }
 
-/// Two averages over 2^`taps_log2` samples.
+/// Power gain of two averages over 2^`taps_log2` samples.
 pub(super) fn filter_gain(taps_log2: u8, period_s: f64, frequency: f64) -> f64 {
     let taps = f64::from(1u32 << taps_log2);
     let half = PI * frequency * period_s;
     ((taps * half).sin() / (taps * half.sin())).powi(4)
 }
 
-/// First order, half power at `corner_hz`.
+/// Power gain of a first-order low-pass with half power at `corner_hz`.
 pub(super) fn low_pass_gain(corner_hz: f64, frequency: f64) -> f64 {
     1.0 / (1.0 + (frequency / corner_hz).powi(2))
 }
 
-/// At one frequency, or variances of one cosine.
+/// Densities at one frequency, or variances of one cosine.
 #[derive(Clone, Copy)]
 pub(super) struct Densities {
-    /// Per unit of N², B² and K², behind the filter.
+    /// Densities per unit of N², B² and K², behind the filter.
     pub(super) baseline: [f64; 3],
     pub(super) known: f64,
     pub(super) truth: f64,
@@ -89,7 +89,7 @@ impl Densities {
     }
 }
 
-/// N², B² and K² of the best fit to `densities` (Whittle, weights `counts`) from `squares` on, by Fisher scoring.
+/// N², B² and K² of the best fit to `densities` (Whittle, weights `counts`) by Fisher scoring, starting at `squares`.
 pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f64; 3]) -> [f64; 3] {
     let deviance = |squares: &[f64; 3]| -> f64 {
         let of = |(densities, count): (&Densities, &f64)| {
@@ -112,7 +112,7 @@ pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f6
             information += *count * shares * shares.transpose();
             score += *count * (densities.truth / modelled - 1.0) * shares;
         }
-        // Without information.
+        // This keeps the matrix invertible without information.
         information += Matrix3::identity() * (LEAST_INFORMATION * information.trace());
         let Some(step) = information.cholesky().map(|factor| factor.solve(&score)) else { break };
         let lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
@@ -135,7 +135,8 @@ pub(super) fn squares(noise: &ChannelNoise) -> [f64; 3] {
 }
 
 impl RecordLength {
-    /// Frequencies, Hz, and the Fourier frequencies that each represents, denser around a `peak` (centre, width).
+    /// Frequencies in Hz, each with the number of Fourier frequencies that it represents. They are denser around a
+    /// `peak` (centre, width).
     fn grid(self, peak: Option<(f64, f64)>) -> Vec<(f64, f64)> {
         let (lowest, highest) = (1.0 / self.seconds, 0.5 / self.period_s);
         let step = (highest / lowest).ln() / GRID as f64;
@@ -149,7 +150,8 @@ impl RecordLength {
         edges.windows(2).map(interval).filter(|(_, count)| *count > 0.0).collect()
     }
 
-    /// Expected log likelihood ratio of `truth` against the best N, B and K behind `gains`, with `known` added.
+    /// Expected log likelihood ratio of `truth` against the best N, B and K behind `gains`, with the density `known`
+    /// added.
     pub(super) fn ratio_against_baseline(
         self,
         noise: &ChannelNoise,
@@ -188,7 +190,7 @@ impl RecordLength {
         self.grid(None).iter().map(|&(frequency, count)| count * waveform(frequency) / noise(frequency)).sum()
     }
 
-    /// Up to half the sample rate.
+    /// Mean of `function` over the frequencies up to half the sample rate.
     pub(super) fn mean(self, function: impl Fn(f64) -> f64) -> f64 {
         let (sum, counts) = self
             .grid(None)
@@ -203,7 +205,7 @@ impl RecordLength {
     }
 }
 
-/// A channel with its noise and the other hidden effects, whose parameters the test knows.
+/// A channel with its noise and the other hidden effects, whose parameters are known to the test.
 pub(super) struct ChannelUnderTest<'a> {
     channel: OutputRegister,
     resolution: f64,
@@ -237,13 +239,13 @@ impl<'a> ChannelUnderTest<'a> {
         self.others.iter().map(filter).product()
     }
 
-    /// Filters of N, B and K; the white noise also has one before the sensor's.
+    /// Power gains of the filters of N, B and K; the white noise has another filter before the sensor's.
     pub(super) fn noise_gains(&self, frequency: f64) -> [f64; 3] {
         let gain = self.gain(frequency);
         [gain * low_pass_gain(self.corner_hz, frequency), gain, gain]
     }
 
-    /// Time constant, s, and variance of the other Markov, common-mode and telegraph processes.
+    /// Time constant in s and variance of the other Markov, common-mode and telegraph processes.
     pub(super) fn processes(&self) -> impl Iterator<Item = (f64, f64)> {
         self.others().filter_map(|effect| match *effect {
             InjectedEffect::Markov { time_constant_s, deviation, .. }
@@ -285,7 +287,7 @@ impl<'a> ChannelUnderTest<'a> {
         slow + resonances.sum::<f64>() + self.spike_density()
     }
 
-    /// Behind the filter: rounding and quantization.
+    /// Density of the noise that arises behind the filter: rounding and quantization.
     pub(super) fn rounding_density(&self, frequency: f64) -> f64 {
         let period_s = self.record.period_s;
         let angle = |effect: &InjectedEffect| match *effect {
@@ -307,10 +309,10 @@ impl<'a> ChannelUnderTest<'a> {
         self.gain(frequency) * baseline + self.known_density(frequency)
     }
 
-    /// True if the filtered white noise stays below half a count or quantum: rounding is then not white.
+    /// True if the filtered white noise is below half a count or quantum, so that rounding is not white.
     pub(super) fn is_below_a_count(&self) -> bool {
         let quantum = |effect: &InjectedEffect| match *effect {
-            // The angle has steps of √12 times the coefficient.
+            // The steps of the angle are √12 times the coefficient.
             InjectedEffect::Quantization { coefficient, .. } => 12f64.sqrt() * coefficient / self.record.period_s,
             _ => 0.0,
         };
@@ -319,7 +321,8 @@ impl<'a> ChannelUnderTest<'a> {
         largest < (0.5 * step).powi(2)
     }
 
-    /// Filtered white noise at `n` samples: density times `2·sin⁴(πfnT)/(n·sin(πfT))²`.
+    /// Allan variance of the filtered white noise at `n` samples: the integral of the density times
+    /// `2·sin⁴(πfnT)/(n·sin(πfT))²`.
     fn white_avar(&self, n: u32) -> f64 {
         let (n, period_s) = (f64::from(n), self.record.period_s);
         self.record.mean(|frequency| {
@@ -329,7 +332,7 @@ impl<'a> ChannelUnderTest<'a> {
         })
     }
 
-    /// Effects are added before the filter.
+    /// Density of the noise referred to the input of the filter, where effects are added.
     pub(super) fn density_before_filter(&self, frequency: f64) -> f64 {
         self.density(frequency) / self.gain(frequency).max(LEAST_GAIN)
     }

@@ -1,11 +1,11 @@
-//! Detection limit: the size that a test that knows the truth detects in half of the recordings.
+//! The detection limit: the size that a test with knowledge of the truth detects in half of the recordings.
 //!
-//! There the expected log likelihood ratio against the best description without the effect is `z²/2`; `z` is the normal
-//! point of 1 % over the number of places (frequencies, times, directions). N, B and K are free, and a Markov process
-//! (telegraph) or independent processes (common mode).
+//! At the limit the expected log likelihood ratio against the best description without the effect is `z²/2`, where `z`
+//! is the normal quantile of 1 % over the number of places (frequencies, times, directions). Free in that description
+//! are N, B and K, and for a telegraph signal a Markov process, for a common mode independent processes.
 //!
-//! The *strength* is size over limit or, if less, `z` over that at the limit ([`strength`]): `z` saturates for slow
-//! processes and drift, and grows with the root of a number of events.
+//! The *strength* is the smaller of size over limit and of `z` over that at the limit ([`strength`]). `z` saturates for
+//! slow processes and drift, and grows with the root of a number of events.
 //!
 //! | effect | log likelihood ratio |
 //! |---|---|
@@ -16,7 +16,7 @@
 //! | ramp, step, temperature, supply | block means, with the variances of their cosines by the exact covariance |
 //! | spikes | mixture of normal distributions |
 //! | dropped and repeated samples | Poisson counts |
-//! | sample clock | what exceeds the tolerance of the host's clock |
+//! | sample clock | deviation beyond the tolerance of the host's clock |
 
 use super::block_covariance::{BLOCKS, BlockNoise, BlockNoises, WaveformTest, environment_means};
 use super::channel_under_test::{
@@ -31,15 +31,15 @@ use statrs::distribution::{ContinuousCDF, DiscreteCDF, Normal, Poisson};
 use std::f64::consts::{LN_2, PI};
 use virtual_sensor::{InjectedEffect, OutputRegister};
 
-/// Crystal of ±50 ppm, uniformly.
+/// Tolerance of a crystal, ±50 ppm, uniformly distributed.
 pub(super) const HOST_CLOCK_TOLERANCE: f64 = 50e-6;
 const FALSE_ALARM: f64 = 0.01;
 const TIME_CONSTANTS: f64 = 12.0;
 pub(super) const TIMES: f64 = 40.0;
 const AXES: f64 = 3.0;
-/// Per correlation time; the level is constant within a step.
+/// Steps per correlation time; the level is constant within a step.
 const TELEGRAPH_STEPS: f64 = 20.0;
-/// The ratio is proportional to it.
+/// Number of simulated steps; the ratio is proportional to it.
 const TELEGRAPH_LENGTH: usize = 20_000;
 
 pub(super) fn strength(effect: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
@@ -60,7 +60,7 @@ pub(super) fn strength(effect: &InjectedEffect, recording: &TrueRecording, other
             let values: Vec<f64> = values.iter().map(|value| size(effect) * value).collect();
             of_size.min(of_z(waveform_test(&in_channel(channel)).ratio(&values), required_ratio(places)))
         }
-        // None of the rarest spikes may fall into the record.
+        // The rarest spikes may not occur in the record at all.
         InjectedEffect::Spikes { rate_per_hour, .. } => {
             of_size.min((rate_per_hour * recording.seconds / 3600.0 / smallest_count(0.0)).sqrt())
         }
@@ -69,7 +69,7 @@ pub(super) fn strength(effect: &InjectedEffect, recording: &TrueRecording, other
     }
 }
 
-/// Size at the limit of `unit`, beside `others`.
+/// Size of `unit` at the limit, in the presence of `others`.
 pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
     let record = RecordLength::new(recording);
     let (seconds, period_s) = (record.seconds, record.period_s);
@@ -111,7 +111,7 @@ pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, ot
                 let rounding = place.rounding_density(frequency);
                 (place.density(frequency) - rounding) * filter_gain(taps_log2, period_s, frequency) + rounding
             };
-            // The size of a filter is 1: its strength is the ratio of `z`.
+            // The size of a filter is always 1, and its strength is the ratio of `z`.
             (required_ratio(1.0) / ratio_against_baseline(&place, None, truth)).sqrt()
         }
         InjectedEffect::RateRamp { channel, .. }
@@ -143,7 +143,7 @@ pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, ot
             let equal = |&channel: &OutputRegister| in_channel(channel).equal_probability();
             smallest_count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
         }
-        // Beyond the host's tolerance; half of the hosts err in its direction.
+        // The limit is the host's tolerance: half of the hosts err in the direction of the effect.
         InjectedEffect::SampleClock { .. } => HOST_CLOCK_TOLERANCE,
     }
 }
@@ -153,7 +153,7 @@ fn smallest_markov(place: &ChannelUnderTest<'_>, time_constant_s: f64) -> f64 {
     smallest_deviation(place, TIME_CONSTANTS, None, |frequency| markov_density(time_constant_s, period_s, frequency))
 }
 
-/// Detected, and distinguished from a Markov process.
+/// Smallest amplitude that is detected and distinguished from a Markov process.
 fn smallest_telegraph(place: &ChannelUnderTest<'_>, time_constant_s: f64, seed: u64) -> f64 {
     let density = place.density_before_filter(0.5 / (PI * time_constant_s));
     let unit = (density / time_constant_s).sqrt();
@@ -163,14 +163,14 @@ fn smallest_telegraph(place: &ChannelUnderTest<'_>, time_constant_s: f64, seed: 
     (2.0 * smallest_markov(place, time_constant_s)).max(unit * distinguished)
 }
 
-/// Deviation at the limit of a process of density `unit_density` at `places` places; `peak` is centre and width, Hz.
+/// Deviation at the limit of a process of density `unit_density` with `places` places; `peak` is centre and width, Hz.
 pub(super) fn smallest_deviation(
     place: &ChannelUnderTest<'_>,
     places: f64,
     peak: Option<(f64, f64)>,
     unit_density: impl Fn(f64) -> f64,
 ) -> f64 {
-    // Relative to the white noise, to begin near the result.
+    // Sizes are relative to the white noise, so that the search begins near the result.
     let white = place.noise.angle_random_walk / place.record.period_s.sqrt();
     let ratio = |relative: f64| ratio_of_process(place, peak, relative * white, &unit_density);
     white * solve_size(required_ratio(places), ratio)
@@ -248,10 +248,10 @@ pub(super) fn ratio_of_telegraph(
     ratio * record.seconds / step_s / TELEGRAPH_LENGTH as f64
 }
 
-/// Expected log likelihood ratio of `samples` samples, of which `probability` are shifted by ±`size` σ.
+/// Expected log likelihood ratio for `samples` samples, a fraction `probability` of which is shifted by ±`size` σ.
 pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 {
     let step = 0.05;
-    // Larger sizes overflow, and are far above the limit.
+    // Larger sizes would overflow, and are far above the limit.
     let size = size.min(37.0);
     let gain = |value: f64| {
         let raised = 0.5 * ((size * value - 0.5 * size * size).exp() + (-size * value - 0.5 * size * size).exp());
@@ -265,15 +265,15 @@ pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 
     samples * ((1.0 - probability) * mean(0.0) + probability * mean(size))
 }
 
-/// Mean number of events at the limit beside a mean of `by_chance`.
+/// Mean number of events at the limit, in addition to a mean of `by_chance`.
 pub(super) fn smallest_count(by_chance: f64) -> f64 {
-    // More than none, one, two …
+    // This is the probability of more than `count` events by chance.
     let exceeds = |count: u64| Poisson::new(by_chance).map_or(0.0, |distribution| distribution.sf(count));
     let mut fewest = 1_u64;
     while exceeds(fewest - 1) > FALSE_ALARM {
         fewest += 1;
     }
-    // Median of a Poisson variable: mean − 1/3; ln 2 for one event.
+    // The median of a Poisson variable is its mean − 1/3; for one event the mean is ln 2.
     if fewest == 1 { LN_2 } else { fewest as f64 - 1.0 / 3.0 - by_chance }
 }
 

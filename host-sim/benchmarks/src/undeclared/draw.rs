@@ -1,4 +1,4 @@
-//! Recordings with hidden effects, drawn from a seed; noise, temperature, supply, clock and motion vary.
+//! Recordings with hidden effects, drawn from a seed. Noise, temperature, supply, clock and motion vary.
 
 use super::channel_under_test::{ChannelUnderTest, RecordLength};
 use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size, strength};
@@ -15,20 +15,21 @@ use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, Se
 use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
 const STRENGTH: (f64, f64) = (0.3, 30.0);
-/// For pairs, triples and effects outside the vocabulary.
+/// Strengths for pairs, triples and effects outside the vocabulary.
 const STRENGTH_OF_PAIR: (f64, f64) = (2.0, 30.0);
-/// Fraction of recordings with an unneeded motion.
+/// Fraction of recordings with a motion that no effect needs.
 const MOVED: f64 = 0.2;
 
-/// Over the angle increment's deviation by white noise; a coarser quantum has no white error.
+/// Largest quantum over the angle increment's deviation by white noise; a coarser one has no white error.
 const LARGEST_QUANTUM: f64 = 1.0;
 const LARGEST_FRACTION: f64 = 0.02;
-/// To temperature, supply and acceleration, in deg/s per degC, V and g: thirty times the data sheet's.
+/// Largest sensitivities to temperature, supply and acceleration, in deg/s per degC, V and g: thirty times the data
+/// sheet's.
 const LARGEST_SENSITIVITIES: [f64; 3] = [0.3, 9.6, 1.5];
 const LARGEST_CLOCK_ERROR: f64 = 0.01;
-/// Over full scale.
+/// Largest size over full scale.
 const LARGEST_PART: f64 = 0.1;
-/// Draws until a set with a weak effect is accepted.
+/// Number of draws after which a set with a weak effect is accepted.
 const DRAWS: usize = 100;
 
 /// The groups of recordings in the table.
@@ -45,17 +46,17 @@ pub enum RecordingGroup {
 /// A recording to be simulated, with its true effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnRecording {
-    /// Gives all other fields, with length and kinds.
+    /// Seed; with length and kinds it determines all other fields.
     pub seed: u64,
-    /// In the order of `simulation`.
+    /// Kinds of the effects, in the order of `simulation`.
     pub kinds: Vec<EffectKind>,
-    /// Size over detection limit.
+    /// Sizes of the effects over their detection limits.
     pub strengths: Vec<f64>,
     pub simulation: TrueRecording,
 }
 
 impl DrawnRecording {
-    /// The recording of `seconds` seconds of a group and a seed.
+    /// The recording of a group and a seed, `seconds` s long.
     #[must_use]
     pub fn from_group(group: RecordingGroup, seconds: f64, seed: u64) -> Self {
         match group {
@@ -67,14 +68,14 @@ impl DrawnRecording {
         }
     }
 
-    /// A recording of `seconds` seconds with an effect that the analysis was not made for.
+    /// A recording, `seconds` s long, with an effect outside the vocabulary of the analysis.
     #[must_use]
     pub fn draw_outside(kind: OutsideKind, seconds: f64, seed: u64) -> Self {
         let nothing = Self::draw(&[], seconds, seed);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX - 3);
         let mut simulation = nothing.simulation;
-        // In a moving accelerometer the motion hides any other effect.
+        // The motion of an accelerometer would hide any other effect.
         let gyros = &OutputRegister::INERTIAL[..3];
         let channel = gyros.choose(&mut random).copied().unwrap_or(OutputRegister::GyroX);
         let strength = log_uniform(&mut random, STRENGTH_OF_PAIR.0, STRENGTH_OF_PAIR.1);
@@ -89,7 +90,7 @@ impl DrawnRecording {
         Self { simulation, strengths: vec![strength], ..nothing }
     }
 
-    /// A recording of `seconds` seconds with effects of `kinds`.
+    /// A recording, `seconds` s long, with effects of `kinds`.
     #[must_use]
     pub fn draw(kinds: &[EffectKind], seconds: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -115,7 +116,7 @@ impl DrawnRecording {
         Self { seed, kinds: kinds.to_vec(), strengths, simulation }
     }
 
-    /// The different kinds of the pair or the triple of a seed.
+    /// The kinds of the pair or triple of a seed, all different.
     #[must_use]
     pub fn several<const KINDS: usize>(seed: u64) -> [EffectKind; KINDS] {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -126,7 +127,7 @@ impl DrawnRecording {
     }
 }
 
-/// A knock in all channels: factor 1 in `channel`, ±½ … 1 in the others, relative to white noise.
+/// The factors of a knock in all channels: 1 in `channel`, ±½ … 1 in the others, relative to the white noise.
 pub(super) fn knock_shares(
     channel: OutputRegister,
     noise: &NoiseModel,
@@ -140,8 +141,8 @@ pub(super) fn knock_shares(
     OutputRegister::INERTIAL.map(&mut share).to_vec()
 }
 
-/// Effects of `kinds` with their strengths from `range`, drawn again if weaker than `at_least`, in noise below a count,
-/// or larger than [`LARGEST_PART`] of full scale; the flag says if the last draw is as asked for.
+/// Effects of `kinds` with strengths from `range`. They are drawn again if weaker than `at_least`, in noise below a
+/// count, or larger than [`LARGEST_PART`] of full scale. The flag is true if the last draw fulfils this.
 pub(super) fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
@@ -179,7 +180,7 @@ pub(super) fn draw_effects(
     drawn
 }
 
-/// Largest change of the output, in the channel's unit; 0 for sizes in other units.
+/// Largest change of the output in the channel's unit; 0 for sizes in other units.
 fn largest_change(effect: &InjectedEffect, seconds: f64) -> f64 {
     match effect {
         InjectedEffect::RateRamp { .. } => size(effect) * seconds,
@@ -200,9 +201,9 @@ fn strength_beside(effects: &[InjectedEffect], at: usize, recording: &TrueRecord
     strength(&effects[at], recording, &others)
 }
 
-/// `strength` times `limit`, or the largest size.
+/// The effect with `strength` times `limit`, or with the largest size.
 fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &TrueRecording) -> InjectedEffect {
-    // Significance grows with the root of a number of events.
+    // Significance grows with the root of the number of events, so that number grows with the square.
     let squared = strength * strength * limit;
     let size = match unit {
         InjectedEffect::Quantization { channel, .. } => {
@@ -225,7 +226,7 @@ fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &Tr
     scaled(unit, size)
 }
 
-/// The paper's noise, times 0.5 … 2 per coefficient.
+/// The noise of the paper, with a random factor of 0.5 … 2 per coefficient.
 fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     let mut noise = NoiseModel::paper();
     for channel in OutputRegister::INERTIAL {
@@ -237,7 +238,7 @@ fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     noise
 }
 
-/// `moved` if an effect needs a motion.
+/// A random environment; it has a motion if `moved`, which is true if an effect needs one.
 fn environment(random: &mut ChaCha8Rng, moved: bool) -> Environment {
     let temperature = TemperatureProfile {
         rise_c: log_uniform(random, 2.0, 12.0),

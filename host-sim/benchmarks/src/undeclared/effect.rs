@@ -1,4 +1,4 @@
-//! The effects that are hidden: their kinds, how their parameters are drawn, and their sizes.
+//! The hidden effects: their kinds, the distributions of their parameters, and their sizes.
 
 use super::channel_under_test::RecordLength;
 use super::environment::{frequency_factor, log_uniform};
@@ -12,7 +12,7 @@ use virtual_sensor::{InjectedEffect, OutputRegister};
 
 pub(super) const GYROS: [OutputRegister; 3] = [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ];
 
-/// The variant of the virtual sensor's effect that is hidden.
+/// Kind of a hidden effect, a variant of the virtual sensor's effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
 #[value(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
@@ -80,14 +80,14 @@ impl EffectKind {
     }
 }
 
-/// An effect of size 1 in `channel`, or another gyro if unsuitable.
+/// An effect of size 1 in `channel`, or in another gyro if the channel is unsuitable.
 pub(super) fn draw_unit(
     kind: EffectKind,
     channel: OutputRegister,
     record: RecordLength,
     random: &mut ChaCha8Rng,
 ) -> InjectedEffect {
-    // An accelerometer's noise is about a count: coarser quanta have no white error.
+    // An accelerometer's noise is about one count, so coarser quanta have no white error.
     let of_gyros = matches!(kind, EffectKind::Quantization | EffectKind::Acceleration);
     let channel = if of_gyros && !GYROS.contains(&channel) { GYROS[random.random_range(0..3)] } else { channel };
     let nyquist = 0.5 / record.period_s;
@@ -161,7 +161,7 @@ pub(super) fn size(effect: &InjectedEffect) -> f64 {
     }
 }
 
-/// A filter's size is fixed.
+/// The effect with its size multiplied by `factor`; a filter's size is fixed.
 pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect {
     match &mut effect {
         InjectedEffect::Sinusoid { amplitude: size, .. }
@@ -184,7 +184,7 @@ pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect 
     effect
 }
 
-/// Names as in a report, with values; times from the sensor's start.
+/// The parameters with their names in a report; times count from the sensor's start.
 pub(super) fn parameters(effect: &InjectedEffect) -> Vec<(&'static str, f64)> {
     match *effect {
         InjectedEffect::Sinusoid { frequency_hz, amplitude, .. } => {

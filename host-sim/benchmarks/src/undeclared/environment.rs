@@ -7,7 +7,7 @@ use rand_distr::{Distribution, Exp1};
 use std::f64::consts::TAU;
 use virtual_sensor::Environment;
 
-/// Deviations from constant values, per sample.
+/// Temperature, supply and force as deviations from constant values, per sample.
 pub(super) struct EnvironmentCourse {
     pub(super) temperature_c: Vec<f64>,
     pub(super) supply_v: Vec<f64>,
@@ -15,7 +15,7 @@ pub(super) struct EnvironmentCourse {
 }
 
 impl EnvironmentCourse {
-    /// At `k·period_s` s.
+    /// The environment at `k·period_s` s for all samples `k`.
     pub(super) fn new(environment: &Environment, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Self {
         let Environment { temperature, supply, motion } = *environment;
         let times = || (0..samples).map(|at| at as f64 * period_s);
@@ -44,7 +44,7 @@ pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * (random.random::<f64>() * (high / low).ln()).exp()
 }
 
-/// At this rate and length, every drawn frequency and time constant is visible.
+/// Rate and length for which every drawn frequency and time constant is visible.
 const USUAL_RATE_HZ: f64 = 100.0;
 const USUAL_S: f64 = 120.0;
 
@@ -53,7 +53,7 @@ pub(super) fn frequency_factor(seconds: f64, period_s: f64) -> f64 {
     (USUAL_S / seconds).max(1.0).min(1.0 / (USUAL_RATE_HZ * period_s))
 }
 
-/// Jumps between two levels with autocorrelation `exp(−t/time_constant)`.
+/// A signal that jumps between two levels, with the autocorrelation `exp(−t/time_constant)`.
 pub(super) fn two_levels(time_constant_s: f64, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Vec<bool> {
     let stay = |random: &mut ChaCha8Rng| {
         let unit: f64 = Exp1.sample(random);
@@ -71,7 +71,7 @@ pub(super) fn two_levels(time_constant_s: f64, samples: usize, period_s: f64, ra
     (0..samples).map(level).collect()
 }
 
-/// Variance 1, autocorrelation `exp(−t/time_constant)`.
+/// A Gauss-Markov process of variance 1 with the autocorrelation `exp(−t/time_constant)`.
 pub(super) fn gauss_markov(time_constant_s: f64, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     let kept = (-period_s / time_constant_s).exp();
     let drive = (1.0 - kept * kept).sqrt();
@@ -99,7 +99,7 @@ mod tests {
         }
     }
 
-    /// 20,000 correlation times: 1/√20,000.
+    /// The tolerance is 1/√20,000 for 20,000 correlation times.
     #[test]
     fn both_processes_have_the_exponential_autocorrelation() {
         let mut random = ChaCha8Rng::seed_from_u64(1);

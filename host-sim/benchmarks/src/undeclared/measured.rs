@@ -1,13 +1,13 @@
-//! Effects hidden in measured noise: reports of a stretch with and without the effect are compared.
+//! Effects hidden in measured noise. The reports of a stretch with and without the effect are compared.
 //!
 //! ```text
 //! recording ─► stretch ─┬───────────────────────────► analysis ─► report of the noise ──────────────┐
-//!                       ├─► N, B, K ─► size ─► effect ─┐                                            ├─► score ─► table
+//!                       ├─► N, B, K ─► size ─► effect ─┐                                            ├─► score ─► JSON ─► tables.py
 //!                       └──────────────────────────────┴► counts ─► analysis ─► report ─────────────┘
 //! ```
 //!
-//! Only findings count that the untouched stretch lacks. Effects that need other quantities, or change the noise
-//! itself, are not hidden.
+//! A finding counts only if the untouched stretch does not have it. Effects that need other quantities or change the
+//! noise itself are not hidden.
 
 mod hidden_kind;
 mod hide;
@@ -15,29 +15,28 @@ mod noise_estimate;
 mod recording;
 mod score;
 mod stretch;
-mod table;
 
 pub use hidden_kind::HiddenKind;
 pub use recording::{MeasuredNoiseError, NoiseRecording};
 pub use score::{MeasuredErrors, MeasuredScore};
-pub use table::MeasuredNoiseTable;
 
 use crate::parallel;
 use noise_analysis::analysis::analyze;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use std::convert::Infallible;
 use stretch::Stretch;
 
-/// Random stream of the stretches; `stretch` and `hide` have others.
+/// Random stream of the stretches; other modules use other streams.
 const STRETCHES: u64 = u64::MAX;
 
 /// Length of a stretch; a shorter recording is one stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StretchLength {
-    /// In s.
+    /// Length in s.
     Seconds(f64),
-    /// In sample periods.
+    /// Length in sample periods.
     Samples(u64),
 }
 
@@ -45,13 +44,21 @@ pub enum StretchLength {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredNoisePlan {
     pub recordings: Vec<NoiseRecording>,
-    /// Each with every kind alone.
+    /// Number of stretches; every kind of effect is hidden alone in each.
     pub stretches: u64,
     pub length: StretchLength,
-    /// Over the detection limit in the channel's N, B and K.
+    /// Size of the effects over the detection limit in the channel's N, B and K.
     pub strength: f64,
     pub seed: u64,
     pub jobs: usize,
+}
+
+/// The scores, in the order of the stretches.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct MeasuredNoiseTable {
+    /// Kinds that no channel of a stretch can have at the strength.
+    pub not_hidden: Vec<HiddenKind>,
+    pub scores: Vec<MeasuredScore>,
 }
 
 impl MeasuredNoisePlan {

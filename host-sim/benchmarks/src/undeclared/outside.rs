@@ -1,4 +1,4 @@
-//! Effects outside the vocabulary; right names are `unexplained` and [`OutsideKind::right_names`].
+//! Effects outside the vocabulary. The right names are `unexplained` and those of [`OutsideKind::right_names`].
 
 use super::environment::{EnvironmentCourse, frequency_factor, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;
@@ -10,49 +10,49 @@ use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 use virtual_sensor::OutputRegister;
 
-/// Deviation of ln level: a factor of 2.
+/// Standard deviation of the level's logarithm: a factor of 2.
 const LEVEL_DEVIATION: f64 = std::f64::consts::LN_2;
-/// Below a hundredth after half a second.
+/// Decay time of a knock, s; below a hundredth after half a second.
 const KNOCK_DECAY_S: f64 = 0.1;
 const FEWEST_DROOPS: f64 = 6.0;
 
-/// Kinds that the analysis was not made for.
+/// Kinds of effects outside the vocabulary of the analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutsideKind {
-    /// Frequency linear over the record.
+    /// A sinusoid whose frequency is linear in time over the record.
     Chirp,
     /// Random jumps that decay exponentially (shot noise).
     Decays,
-    /// A rise and a sudden fall, again and again.
+    /// A repeated rise and sudden fall.
     Sawtooth,
-    /// Amplitude swells and fades by half.
+    /// A line whose amplitude rises and falls by half.
     ModulatedLine,
     /// White noise that grows with the temperature.
     LevelByTemperature,
-    /// Stuck for a while, in one channel (E. Balaban et al., IEEE Sensors J. 9, 2009).
+    /// One channel that is stuck for a while (E. Balaban et al., IEEE Sensors J. 9, 2009).
     HeldValue,
-    /// Offset of every second sample (N. Kurosawa et al., IEEE Trans. Circuits Syst. I 48, 2001).
+    /// An offset of every second sample (N. Kurosawa et al., IEEE Trans. Circuits Syst. I 48, 2001).
     AlternatingConverters,
-    /// The sample clock changes once.
+    /// One change of the sample clock.
     ClockStep,
-    /// Exponential approach after the start, without the thermometer.
+    /// An exponential approach after the start that the thermometer does not show.
     SelfHeating,
-    /// Constant after an overload, again and again (IEEE Std 1241).
+    /// Constant outputs after an overload, repeatedly (IEEE Std 1241).
     DeadTime,
-    /// Regular short drops, not measured.
+    /// Regular short drops of the supply that its output does not show.
     SupplyDroop,
     SwitchedLine,
-    /// At carries (IEEE Std 1241).
+    /// Missing codes at carries (IEEE Std 1241).
     MissingCodes,
-    /// A vibration whose level wanders.
+    /// A vibration with a varying level.
     WanderingBand,
-    /// Half a second of damped oscillation in all six channels.
+    /// A damped oscillation of half a second in all six channels.
     Knock,
 }
 
 impl OutsideKind {
-    /// Every kind, in the order of the tables.
+    /// All kinds, in the order of the tables.
     pub const ALL: [Self; 15] = [
         Self::Chirp,
         Self::Decays,
@@ -71,7 +71,7 @@ impl OutsideKind {
         Self::Knock,
     ];
 
-    /// Its name in the tables.
+    /// The name of the kind in the tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -103,7 +103,7 @@ impl OutsideKind {
             Self::ModulatedLine | Self::SwitchedLine => &["modulated_line"],
             Self::LevelByTemperature => &["level_change"],
             Self::HeldValue | Self::DeadTime => &["stuck"],
-            // A line at half the sample rate.
+            // It is a line at half the sample rate.
             Self::AlternatingConverters => &["sinusoid", "periodic"],
             Self::ClockStep => &["sample_clock"],
             Self::MissingCodes => &["missing_codes"],
@@ -118,16 +118,16 @@ impl OutsideKind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutsideEffect {
     pub(super) kind: OutsideKind,
-    /// Outputs with factors on the size; none for the sample clock.
+    /// The outputs with their factors on the size; empty for the sample clock.
     pub(super) shares: Vec<(OutputRegister, f64)>,
-    /// In the channel's unit, s of a held value and of dead time, or relative change of a clock step.
+    /// Size in the channel's unit; in s for a held value and a dead time; relative for a clock step.
     pub(super) size: f64,
-    /// Hz: first and last frequency of a sweep; else repetition and modulation; 1/interval and 1/time constant of
-    /// random events; centre and width of a band. 1/modulus of missing codes.
+    /// Frequencies, Hz: first and last of a sweep; or repetition and modulation; or 1/interval and 1/time constant of
+    /// random events; or centre and width of a band. For missing codes 1/modulus.
     pub(super) frequencies_hz: [f64; 2],
     /// Onset, s from the first sample, and time constant or length, s.
     pub(super) times_s: [f64; 2],
-    /// For its own random numbers.
+    /// Seed of the effect's own random numbers.
     pub(super) seed: u64,
 }
 
@@ -140,7 +140,7 @@ impl OutsideEffect {
         self.shares.iter().map(|(channel, _)| *channel)
     }
 
-    /// True for a part that is found without the rest, as the carrier of a changing line.
+    /// True if the finding is a part of the effect, such as the carrier of a changing line.
     pub(super) fn has_part(&self, found: &Effect) -> bool {
         let [carrier_hz, change_hz] = self.frequencies_hz;
         let changes = matches!(self.kind, OutsideKind::ModulatedLine | OutsideKind::SwitchedLine);
@@ -152,7 +152,7 @@ impl OutsideEffect {
         self.shares.is_empty() || self.channels().any(|of| of == channel)
     }
 
-    /// Random parameters, size 1, `seconds` long.
+    /// An effect of size 1 with random parameters, for a record of `seconds` s.
     pub(super) fn draw_unit(
         kind: OutsideKind,
         channel: OutputRegister,
@@ -166,7 +166,7 @@ impl OutsideEffect {
                 let first = factor * log_uniform(random, 1.0, 10.0);
                 [first, first * log_uniform(random, 2.0, 5.0)]
             }
-            // Ten to forty, a fiftieth to a fifth of the interval.
+            // There are ten to forty jumps; they decay within a fiftieth to a fifth of the interval.
             OutsideKind::Decays => {
                 let rate = log_uniform(random, 10.0, 40.0) / seconds;
                 [rate, rate * log_uniform(random, 5.0, 50.0)]
@@ -184,7 +184,7 @@ impl OutsideEffect {
                 [0.0; 2]
             }
             OutsideKind::DeadTime => [log_uniform(random, 10.0, 40.0) / seconds, 0.0],
-            // A twentieth to a fifth.
+            // The droops last a twentieth to a fifth of the period.
             OutsideKind::SupplyDroop => {
                 let lowest = (0.05 * factor).max(FEWEST_DROOPS / seconds);
                 let frequency = log_uniform(random, lowest, 10.0 * lowest);
@@ -206,7 +206,7 @@ impl OutsideEffect {
         Self { kind, shares, size: 1.0, frequencies_hz, times_s, seed: random.random() }
     }
 
-    /// Added to a channel with factor 1; empty for counts and clock.
+    /// The signal of a channel with factor 1; empty for effects of counts and clock.
     pub(super) fn signal(&self, environment: &EnvironmentCourse, samples: usize, period_s: f64) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let (size, [first, second], [begin_s, part_s]) = (self.size, self.frequencies_hz, self.times_s);
@@ -251,7 +251,7 @@ impl OutsideEffect {
                 let level = gauss_markov(part_s, samples, period_s, &mut random);
                 let value = |at: usize| {
                     let phase = TAU * first * at as f64 * period_s;
-                    // Mean square of the level: 1.
+                    // The level has a mean square of 1.
                     let level = (LEVEL_DEVIATION * level[at] - LEVEL_DEVIATION.powi(2)).exp();
                     size * level * (cosine[at] * phase.cos() + sine[at] * phase.sin())
                 };
@@ -297,13 +297,13 @@ impl OutsideEffect {
         }
     }
 
-    /// True if the converter never gives `code`.
+    /// True if the converter never returns `code`.
     pub(super) fn is_missing(&self, code: i32) -> bool {
         let modulus = (1.0 / self.frequencies_hz[0]).round() as i32;
         code.rem_euclid(modulus) == modulus - 1
     }
 
-    /// True time of a sample nominally at `time_s`.
+    /// True time of a sample that is nominally at `time_s`, s.
     pub(super) fn sampled_at(&self, time_s: f64) -> f64 {
         match self.kind {
             OutsideKind::ClockStep => time_s + self.size * (time_s - self.times_s[0]).max(0.0),
@@ -379,13 +379,13 @@ mod tests {
         let dead = OutsideEffect { size: 0.1, ..effect(OutsideKind::DeadTime) };
         let mut changed = counts();
         dead.change_counts(&mut changed, PERIOD_S);
-        // 10 to 40 events of 20 samples; 3.5 σ.
+        // There are 10 to 40 events of 20 samples; the tolerance is 3.5 σ.
         let events = standing(&changed) as f64 / 19.0;
         let expected = dead.frequencies_hz[0] * SAMPLES as f64 * PERIOD_S;
         assert!((events - expected).abs() < 3.5 * expected.sqrt(), "{events}, {expected}");
     }
 
-    /// 2.5 Hz at most.
+    /// The highest frequency is 2.5 Hz.
     #[test]
     fn no_frequency_is_above_half_of_a_low_sample_rate() {
         for (kind, seed) in OutsideKind::ALL.into_iter().flat_map(|kind| (0..20).map(move |seed| (kind, seed))) {
@@ -397,7 +397,7 @@ mod tests {
                 kind,
                 OutsideKind::HeldValue | OutsideKind::DeadTime | OutsideKind::ClockStep | OutsideKind::MissingCodes
             );
-            // No change without a change of temperature.
+            // The level changes only with the temperature.
             let changes = signal.iter().filter(|value| value.abs() > 0.1).count();
             assert!(is_of_codes || kind == OutsideKind::LevelByTemperature || changes > 5, "{kind:?}: {changes}");
         }
@@ -423,7 +423,7 @@ mod tests {
         assert_eq!([50.0, 100.0, 300.0].map(|time_s| clock.sampled_at(time_s)), [50.0, 100.0, 302.0]);
     }
 
-    /// ½·½ of a switched line, `p` of droops, about 1 of a wandering band.
+    /// The mean squares are ½·½ for a switched line, `p` for droops, and about 1 for a wandering band.
     #[test]
     fn signals_have_the_power_of_their_definition() {
         let power = |kind: OutsideKind| {

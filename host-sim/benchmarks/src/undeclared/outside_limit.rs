@@ -1,4 +1,4 @@
-//! Detection limit outside the vocabulary, for a test that knows the signal.
+//! The detection limit of effects outside the vocabulary, for a test that knows the signal.
 
 use super::block_covariance::BLOCKS;
 use super::channel_under_test::{ChannelUnderTest, resonance_density};
@@ -8,7 +8,7 @@ use super::detection_limit::{
 use super::environment::EnvironmentCourse;
 use super::outside::{OutsideEffect, OutsideKind, relative};
 
-/// Size at `strength` times the limit, and the strength obtained; missing codes have no size.
+/// The effect at `strength` times the limit, and the strength obtained; missing codes have no size.
 pub(super) fn with_strength(
     unit: OutsideEffect,
     strength: f64,
@@ -37,7 +37,7 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
         let unit = unit.signal(environment, samples as usize, period_s);
         (required_ratio(places) / ratio_of_signal(&unit, period_s, density)).sqrt()
     };
-    // Each of a row as improbable as two equal neighbours.
+    // Each equal sample of a row is as improbable as two equal neighbours.
     let equal = |places: f64| required_ratio(places) / -place.equal_probability().ln();
     match effect.kind() {
         OutsideKind::Chirp | OutsideKind::Sawtooth | OutsideKind::ModulatedLine | OutsideKind::SwitchedLine => {
@@ -60,7 +60,7 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
         OutsideKind::ClockStep => HOST_CLOCK_TOLERANCE,
         OutsideKind::SelfHeating => {
             let block_s = place.record.seconds / BLOCKS as f64;
-            // Mean of the approach per block.
+            // The values are means of the approach per block.
             let (length, test) = (block_s / effect.times_s[1], waveform_test(place));
             let mean = |block: usize| 1.0 - (-length * block as f64).exp() * -(-length).exp_m1() / length;
             let values: Vec<f64> = (0..BLOCKS).map(mean).collect();
@@ -78,7 +78,7 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
     }
 }
 
-/// Matched filter: energy of the spectrum over two-sided noise, without the mean.
+/// Ratio of a matched filter: energy of the spectrum over the two-sided noise density, without the mean.
 fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) -> f64 {
     let transform = fourier::forward(signal.len());
     let (mut input, mut output) = (signal.to_vec(), transform.make_output_vec());
@@ -95,7 +95,7 @@ fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) 
     output.iter().enumerate().skip(1).map(energy).sum()
 }
 
-/// Against the best constant variance, per sample.
+/// Log likelihood ratio of varying variances against the best constant variance, from the added variance per sample.
 fn ratio_of_levels(added: impl Iterator<Item = f64>) -> f64 {
     let (sum, logs, count) =
         added.fold((0.0, 0.0, 0.0), |(sum, logs, count), added: f64| (sum + added, logs + added.ln_1p(), count + 1.0));
@@ -107,7 +107,7 @@ mod tests {
     use super::{ratio_of_levels, ratio_of_signal};
     use std::f64::consts::TAU;
 
-    /// `A²T/(4S)` (D. Rife and R. Boorstyn 1974).
+    /// The ratio is `A²T/(4S)` (D. Rife and R. Boorstyn 1974).
     #[test]
     fn the_ratio_of_a_sinusoid_has_its_closed_form() {
         let signal: Vec<f64> = (0..1000).map(|at| 0.3 * (TAU * 0.07 * f64::from(at)).sin()).collect();
@@ -115,7 +115,7 @@ mod tests {
         assert!((ratio_of_signal(&signal, 0.01, |_| 0.2) / expected - 1.0).abs() < 1e-6);
     }
 
-    /// `½·Σs²/σ²` in white noise.
+    /// The ratio is `½·Σs²/σ²` in white noise.
     #[test]
     fn the_ratio_of_an_alternating_offset_is_half_its_energy() {
         let signal: Vec<f64> = (0..1000).map(|at| if at % 2 == 0 { 0.3 } else { -0.3 }).collect();
@@ -123,7 +123,7 @@ mod tests {
         assert!((ratio_of_signal(&signal, 0.01, |_| 0.2) / expected - 1.0).abs() < 1e-6);
     }
 
-    /// Half of variance 1, half of 3: ½·n·(ln 2 − ½ ln 3).
+    /// Half of the samples have variance 1, half 3: the ratio is ½·n·(ln 2 − ½ ln 3).
     #[test]
     fn the_ratio_of_two_levels_has_its_closed_form() {
         let added = (0..1000).map(|at| if at < 500 { 0.0 } else { 2.0 });

@@ -1,4 +1,4 @@
-//! Randomly lost samples.
+//! Random losses of samples.
 
 use measurement::Measurement;
 use rand::{Rng, SeedableRng};
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 /// Random stream of the losses.
 const STREAM: u64 = u64::MAX - 2;
 
-/// Removes samples but the first and last with the probability `share`, in every channel, as `gap`.
+/// Removes samples with the probability `share` in every channel, as `gap`; the first and the last sample are kept.
 pub(super) fn lose_samples(measurement: &mut Measurement, share: f64, seed: u64) {
     if share <= 0.0 || measurement.is_empty() {
         return;
@@ -58,7 +58,7 @@ mod tests {
         let mut lossy = whole.clone();
         lose_samples(&mut lossy, 0.02, 7);
         let lost = whole.len() - lossy.len();
-        // 409.6 ± 20 of 20,480.
+        // 409.6 ± 20 of 20,480 samples are expected.
         assert!((330..490).contains(&lost), "{lost}");
         assert_eq!(lossy.dropped["gap"], whole.dropped["gap"] + lost as u64);
         assert_eq!(lossy.periods(), whole.periods());

@@ -1,4 +1,4 @@
-//! The score of one recording: simulated, analysed, compared with the truth.
+//! The score of one recording, which is simulated, analysed and compared with the truth.
 
 use super::channel_under_test::ChannelUnderTest;
 use super::draw::DrawnRecording;
@@ -13,7 +13,7 @@ use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
 use virtual_sensor::InjectedEffect;
 
-/// Scored channels, and those that effects depend on.
+/// The scored channels, and the channels on which effects depend.
 const RECORDED: [Channel; 8] = [
     Channel::Supply,
     Channel::GyroX,
@@ -27,7 +27,7 @@ const RECORDED: [Channel; 8] = [
 
 pub(super) const UNEXPLAINED: &str = "unexplained";
 
-/// Why a recording could not be scored.
+/// The reason for which a recording could not be scored.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreError {
@@ -39,7 +39,7 @@ pub enum ScoreError {
     },
 }
 
-/// For a named effect, in the report's unit.
+/// The error of a parameter of a named effect, in the report's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterScore {
     pub kind: EffectKind,
@@ -48,7 +48,7 @@ pub struct ParameterScore {
     pub value: f64,
     pub low: f64,
     pub high: f64,
-    /// For a sensitivity to three axes, over its length.
+    /// Relative error; for a sensitivity to three axes it is relative to the vector's length.
     pub relative_error: f64,
 }
 
@@ -59,19 +59,20 @@ pub struct EffectScore {
     /// Size over detection limit.
     pub strength: f64,
     pub named: bool,
-    /// Detected by a test with channel and waveform but unknown noise; absent in pairs and for other effects.
+    /// True if a test with known channel and waveform but unknown noise detects the effect; absent in pairs and for
+    /// other effects.
     pub shape_known: Option<bool>,
-    /// First other effect in its channels, if not named.
+    /// The first other effect in its channels, if it is not named.
     pub instead: Option<String>,
 }
 
-/// Deviance per point on the unseen half, in the first channel with an effect.
+/// Deviances per point on the unseen half, in the first channel with an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UnseenErrors {
     pub before: f64,
     pub after: f64,
     pub truth: f64,
-    /// True terms fitted to the other half: the error of the fit.
+    /// Deviance with the true terms fitted to the other half: it shows the error of the fit.
     pub refitted: f64,
 }
 
@@ -80,30 +81,30 @@ pub struct UnseenErrors {
 pub struct RecordingScore {
     pub seed: u64,
     pub answers: Vec<EffectScore>,
-    /// As `channel: kind`.
+    /// Names without a hidden effect, as `channel: kind`.
     pub false_alarms: Vec<String>,
     pub estimates: Vec<ParameterScore>,
-    /// Absent if nothing is hidden, or an error is not finite.
+    /// Absent if no effect is hidden, or if an error is not finite.
     pub unseen: Option<UnseenErrors>,
-    /// Effect outside the vocabulary.
+    /// Score of the effect outside the vocabulary.
     pub outside: Option<OutsideScore>,
 }
 
-/// A hidden effect that the analysis was not made for.
+/// The score of a hidden effect outside the vocabulary.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutsideScore {
     pub kind: OutsideKind,
     /// Size over detection limit.
     pub strength: f64,
-    /// `unexplained` in its channel.
+    /// True if its channel is reported as `unexplained`.
     pub unexplained: bool,
     pub named: bool,
 }
 
-/// Generates a recording, loses the share `loss`, analyses it and compares with the truth.
+/// Generates a recording, removes the fraction `loss` of samples, analyses it and compares the report with the truth.
 ///
 /// # Errors
-/// The recording has no timeline.
+/// The recording has no time base.
 pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingScore, ScoreError> {
     let seed = drawn.seed;
     let mut recording = drawn.simulation.record();
@@ -123,7 +124,7 @@ pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingSco
         let truth = true_model_errors(drawn, channel);
         let of = report.channels.iter().find(|report| report.name == channel.name());
         score.unseen = of.zip(truth).and_then(|(report, truth)| {
-            // Without spikes by the first half's rule, as the true model.
+            // The error excludes spikes by the rule of the first half, as for the true model.
             let error =
                 |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
             Some(UnseenErrors {
@@ -137,10 +138,10 @@ pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingSco
     Ok(score)
 }
 
-/// `loss` is the share lost beside the effects.
+/// The score of a report; `loss` is the fraction of samples lost in addition to the effects.
 pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> RecordingScore {
     let moved = drawn.simulation.scenario.environment.motion.deviation_g > 0.0;
-    // A motion can resemble any kind in an accelerometer.
+    // In an accelerometer a motion can resemble any kind.
     let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
     let scored: Vec<(Channel, &ChannelReport)> = Channel::INERTIAL
         .into_iter()
@@ -158,7 +159,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
         .zip(effects)
         .zip(&drawn.strengths)
         .map(|((&kind, effect), &strength)| {
-            // Counts that seldom change show no filter.
+            // Counts that seldom change cannot show a filter.
             let is_shown = |channel: Channel| kind != EffectKind::FilterBandwidth || !is_below_a_count(channel);
             let shown = scored.iter().filter(|(channel, _)| shows_in(effect, *channel) && is_shown(*channel));
             score_effect(kind, strength, &shown.map(|(_, report)| *report).collect::<Vec<_>>())
@@ -168,7 +169,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
     let is_true = |channel: Channel, found: &Effect| {
         let kind = found.name();
         let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
-        // `unexplained` for a part is no wrong name.
+        // `unexplained` for a part of an effect is not a wrong name.
         let output = simulation::output_register(channel);
         let is_outside = outside.is_some_and(|effect| {
             let describes =
@@ -210,7 +211,7 @@ fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
     effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }
 
-/// Named if listed in half of its channels; sample faults and clock in one.
+/// An effect counts as named if half of its channels list it; one channel suffices for sample faults and clock.
 pub(super) fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) -> EffectScore {
     let listing =
         affected.iter().filter(|report| report.effects.iter().any(|found| found.effect.name() == kind.name())).count();
@@ -226,7 +227,7 @@ pub(super) fn score_effect(kind: EffectKind, strength: f64, affected: &[&Channel
     }
 }
 
-/// In the first channel that lists it.
+/// The parameters in the first channel that lists the effect.
 pub(super) fn score_parameters(
     kind: EffectKind,
     effect: &InjectedEffect,

@@ -1,4 +1,4 @@
-//! Reference results from the truth: error of the true model, and the test with a known waveform.
+//! Reference results that use the truth: the error of the true model, and the test with a known waveform.
 
 use super::block_covariance::{BLOCKS, BlockNoises, block_means, environment_means, p_value};
 use super::channel_under_test::ChannelUnderTest;
@@ -15,10 +15,10 @@ use recordings::recording::{RecordedSample, Recording};
 use simulation::{SAMPLE_RATE_HZ, output_register};
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister, SensorScenario};
 
-/// For the analysis, per channel.
+/// Probability of a false alarm per channel of the analysis.
 const FALSE_ALARM: f64 = 2e-4;
 
-/// False for terms of the true model.
+/// True for effects that are removed; false for terms of the true model.
 fn is_removable(effect: &InjectedEffect) -> bool {
     !matches!(
         effect,
@@ -32,20 +32,20 @@ fn is_removable(effect: &InjectedEffect) -> bool {
     )
 }
 
-/// Deviance per point on the second half without removable effects; a common mode is removable.
+/// Deviances per point on the second half without removable effects, of which a common mode is one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TrueModelErrors {
     pub(super) model: f64,
-    /// Coefficients and shapes fitted to the first half.
+    /// Deviance with coefficients and shapes fitted to the first half.
     pub(super) fitted: f64,
 }
 
-/// `None` for short recordings.
+/// The errors of the true model; `None` for short recordings.
 pub(super) fn true_model_errors(drawn: &DrawnRecording, channel: Channel) -> Option<TrueModelErrors> {
     let effects: Vec<InjectedEffect> =
         drawn.simulation.scenario.effects.iter().filter(|effect| !is_removable(effect)).cloned().collect();
     let model = model(drawn.simulation.noise.channel(output_register(channel)), channel, &effects);
-    // Streams go by index: size 0 replaces an effect.
+    // Random streams go by index, so an effect is replaced by one of size 0.
     let hidden = SensorScenario {
         effects: drawn.simulation.scenario.effects.iter().map(zero_if_removable).collect(),
         ..drawn.simulation.scenario.clone()
@@ -113,7 +113,8 @@ fn curve(samples: &[RecordedSample], channel: Channel, range: GyroRange) -> alla
     cascade.curve(1.0 / SAMPLE_RATE_HZ).scaled(channel.lsb(range))
 }
 
-/// Known channel and waveform, estimated noise, at the analysis' significance; `None` for other effects.
+/// True if a test with known channel and waveform, and estimated noise, detects the effect at the significance of the
+/// analysis. `None` for other effects.
 pub(super) fn detects_known_waveform(
     effect: &InjectedEffect,
     truth: &TrueRecording,

@@ -2,13 +2,13 @@
 
 use link::{DecoderCounters, Health, Hello, Message, RawMessage, Received};
 
-/// Reads of PROD_ID that the device makes at one command.
+/// Reads of PROD_ID that the device makes per command.
 const READS_AT_ONCE: u32 = 10_000;
 
-/// How much is measured.
+/// The extent of the measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct BenchPlan {
-    /// Reads of PROD_ID.
+    /// Number of reads of PROD_ID.
     pub reads: u32,
     /// Time for which the noise is measured without and with a filter, s each.
     pub noise_s: f64,
@@ -17,7 +17,7 @@ pub struct BenchPlan {
 }
 
 impl Default for BenchPlan {
-    /// A million reads and a minute of bursts: two minutes in all.
+    /// The default takes two minutes: a million reads and a minute of bursts.
     fn default() -> Self {
         Self { reads: 1_000_000, noise_s: 4.0, bursts_s: 60.0 }
     }
@@ -40,20 +40,20 @@ pub(crate) enum Topic {
     Unfiltered,
     /// Raw bursts behind averages of 16 samples.
     Filtered,
-    /// The bursts that are counted.
+    /// Bursts that are counted.
     Bursts,
-    /// The report on them.
+    /// The report on the counted bursts.
     BurstReport,
 }
 
-/// When a step has its answer; it ends after its time in any case.
+/// The event that completes the answer to a step; a step ends after its time in any case.
 #[derive(Debug, Clone, Copy)]
 enum Answered {
-    /// With a line or a log message that begins with one of these.
+    /// The answer ends with a line or a log message that begins with one of these.
     By(&'static [&'static str]),
-    /// With the last message of a report.
+    /// The answer ends with the last message of a report.
     ByReport,
-    /// Only after its time.
+    /// The answer ends only after its time.
     AfterItsTime,
 }
 
@@ -66,7 +66,7 @@ pub struct Step {
     pub seconds: f64,
     pub(super) topic: Topic,
     answered: Answered,
-    /// Left out if the sensor does not answer: there is nothing to measure.
+    /// True if the step is left out when the sensor does not answer.
     pub(super) needs_sensor: bool,
 }
 
@@ -81,13 +81,13 @@ struct Answer {
 #[derive(Debug, Default)]
 pub struct Transcript {
     answers: Vec<Answer>,
-    /// Counters of the decoder meanwhile.
+    /// The decoder's counts during the run.
     pub counters: DecoderCounters,
     /// Messages of a second port while the bursts were counted.
     pub second_port: Option<Vec<Received>>,
 }
 
-/// Patterns that are written to a register of 16 bits and read back, the last of them its reset value.
+/// Patterns that are written to a 16-bit register and read back; the last one is its reset value.
 pub(super) const PATTERNS: [u16; 5] = [0x5555, 0xAAAA, 0xFF00, 0x00FF, 0x0000];
 
 impl BenchPlan {
@@ -137,7 +137,7 @@ impl BenchPlan {
             raw(Topic::Bursts, self.bursts_s),
             silence(),
             step(Topic::BurstReport, "r", 15.0, Answered::ByReport, true),
-            // Behind the report, which would count the samples that are lost meanwhile.
+            // This step follows the report, which would count the samples lost during it.
             step(Topic::Measurement, "measure", 2.0, Answered::By(&["DRDY: high for", "DRDY: no pulse"]), false),
         ]);
         steps
@@ -145,13 +145,13 @@ impl BenchPlan {
 }
 
 impl Step {
-    /// True for the step that counts bursts, which a second port must carry too.
+    /// True for the step that counts bursts, which a second port must receive too.
     #[must_use]
     pub fn counts_bursts(&self) -> bool {
         self.topic == Topic::Bursts
     }
 
-    /// True for the end of the answer.
+    /// True if this is the end of the answer.
     pub(super) fn is_answered_by(&self, received: &Received) -> bool {
         match (self.answered, received) {
             (Answered::By(starts), received) => {
@@ -169,7 +169,7 @@ impl Transcript {
         self.answers.push(Answer { topic: step.topic, received });
     }
 
-    /// True if nothing has come.
+    /// True if nothing was received.
     pub(crate) fn is_silent(&self) -> bool {
         self.answers.iter().all(|answer| answer.received.is_empty())
     }
@@ -178,7 +178,7 @@ impl Transcript {
         self.answers.iter().filter(move |answer| answer.topic == topic).flat_map(|answer| &answer.received)
     }
 
-    /// Lines of text, and log messages, on a topic.
+    /// Lines of text, and log messages, of a topic.
     pub(crate) fn lines(&self, topic: Topic) -> impl Iterator<Item = &str> {
         self.received(topic).filter_map(text)
     }
@@ -201,7 +201,7 @@ impl Transcript {
         raw_messages(self.received(topic))
     }
 
-    /// Commands that set rate, range, filter and reports as they were.
+    /// Commands that restore rate, range, filter and reports.
     #[must_use]
     pub fn settings_before(&self) -> Vec<String> {
         let Some(hello) = self.hello(Topic::Report) else { return Vec::new() };
@@ -214,7 +214,7 @@ impl Transcript {
     }
 }
 
-/// A line of text or a log message.
+/// The text of a line or of a log message.
 fn text(received: &Received) -> Option<&str> {
     match received {
         Received::Text(line) => Some(line.as_str()),

@@ -1,4 +1,4 @@
-//! A check for each figure of the answers, and the probable cause of each that fails.
+//! Checks of the answers against limits, with the probable cause of each failure.
 
 use super::transcript::{PATTERNS, Topic, Transcript, raw_messages};
 use adis16405_driver::{Channel, GyroRange, OutputWord, Product};
@@ -6,7 +6,7 @@ use link::{BootCause, ClockSource, Health, RawMessage, Received};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// A figure, its limit, and the cause if it is beyond it.
+/// A check: a figure, its limit, and the probable cause if it is beyond the limit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Check {
     /// Name of the figure.
@@ -15,7 +15,7 @@ pub struct Check {
     pub measured: String,
     /// Its limit, with the page or table of the data sheet.
     pub limit: String,
-    /// Why it fails, probably.
+    /// The probable cause of a failure; `None` if the check passes.
     pub cause: Option<Cause>,
 }
 
@@ -30,75 +30,75 @@ pub enum Cause {
     LinkLoss,
     /// The crystal did not start.
     NoCrystal,
-    /// The board has restarted meanwhile.
+    /// The board has restarted during the run.
     Restarted(BootCause),
-    /// No answer and no data-ready pulse.
+    /// There is no answer and no data-ready pulse.
     NoSupply,
-    /// All answers are zeros, and data ready pulses.
+    /// All answers are zeros, but data ready pulses.
     DataLow,
-    /// All answers are ones, and data ready pulses.
+    /// All answers are ones, but data ready pulses.
     DataHigh,
     /// PROD_ID is shifted by a bit.
     SpiMode,
     /// Every register gives the same answer.
     RequestsLost,
-    /// Bits that never change.
+    /// These bits never change.
     StuckBits(u16),
-    /// Another sensor of the family.
+    /// It is another sensor of the family, with this PROD_ID.
     OtherProduct(u16),
-    /// Ones arrive as zeros, and no zero as a one.
+    /// Ones arrive as zeros, but no zero arrives as a one.
     OnesLost,
     /// Bits are damaged at random.
     BitErrors,
-    /// Answers are right at the slow clock alone.
+    /// Answers are right only at the slow clock.
     FastClockFails,
     /// SCK is beyond the sensor's limit.
     SckTooFast,
     /// Frames follow one another too soon.
     FramesTooSoon,
-    /// Bits of what is written arrive damaged.
+    /// These bits of written values arrive damaged.
     WritesDamaged(u16),
-    /// Sensors that fail the self-test.
+    /// These sensors fail the self-test.
     SelfTest(String),
-    /// Axes that the stimulus does not deflect.
+    /// The stimulus does not deflect these axes.
     NoDeflection(String),
-    /// No data-ready pulse, though the sensor answers.
+    /// There is no data-ready pulse, although the sensor answers.
     NoDataReady,
-    /// Data ready at another rate.
+    /// Data ready has another rate than set.
     DataReadyRate,
-    /// Pulses of another width.
+    /// The data-ready pulses have a wrong width.
     DataReadyWidth,
-    /// Edges many times in a row.
+    /// The data-ready line has many edges in a row.
     DataReadyFloats,
-    /// Edges that do not arrive.
+    /// Data-ready edges do not arrive.
     EdgesLost,
-    /// Edges that are none.
+    /// There are data-ready edges without a sample.
     EdgesAdded,
-    /// More noise than the sensor makes.
+    /// The noise is larger than the sensor's.
     TooNoisy,
-    /// Less noise than the sensor makes.
+    /// The noise is smaller than the sensor's.
     TooQuiet,
-    /// The filter does not do what was set.
+    /// The filter does not have the effect of its setting.
     FilterNotSet,
-    /// Supply below its window, in mV.
+    /// The supply is below its window, in mV.
     SupplyLow(u32),
-    /// Supply above its window, in mV.
+    /// The supply is above its window, in mV.
     SupplyHigh(u32),
     /// The line from DOUT is interrupted at times.
     LooseData,
     /// Clocks are lost or doubled.
     ClockEdges,
-    /// The same burst again and again.
+    /// The same burst repeats.
     Frozen,
-    /// Bursts without a new sample.
+    /// Bursts have no new sample.
     NothingNew,
     /// The sensor was lost and recovered.
     Recovered,
-    /// The board does not keep up.
+    /// The board is too slow.
     BoardOverrun,
     /// The sum of the accelerations is not that of gravity, or the rates are not near 0.
     Moving,
-    /// Two ports differ.
+    /// The bursts of two ports differ.
     PortsDiffer,
 }
 
@@ -202,7 +202,7 @@ impl Check {
         Self { name, measured: measured.into(), limit: limit.to_owned(), cause }
     }
 
-    /// A figure that could not be measured.
+    /// A check that could not be measured.
     fn not_run(name: &'static str, limit: &str) -> Self {
         Self::new(name, "", limit, None)
     }
@@ -213,7 +213,7 @@ fn register_value(line: &str) -> Option<u16> {
     u16::from_str_radix(line.split_whitespace().nth(2)?.strip_prefix("0x")?, 16).ok()
 }
 
-/// The number behind `prefix` in a line, in which commas may stand between thousands.
+/// The number after `prefix` in a line; it may have commas between thousands.
 fn number_behind(line: &str, prefix: &str) -> Option<f64> {
     line.split_once(prefix)?.1.split_whitespace().next()?.trim_end_matches(':').replace(',', "").parse().ok()
 }
@@ -222,7 +222,7 @@ fn identity(transcript: &Transcript) -> Option<u16> {
     transcript.lines(Topic::Identity).filter(|line| line.starts_with("PROD_ID")).find_map(register_value)
 }
 
-/// True if the sensor gives no answer that the firmware takes.
+/// True if the sensor gives no answer that the firmware accepts.
 pub(super) fn is_deaf(transcript: &Transcript) -> bool {
     let known = identity(transcript).and_then(Product::from_prod_id).is_some();
     !known && !transcript.hello(Topic::Report).is_some_and(|hello| hello.sampling)
@@ -233,9 +233,9 @@ pub(super) fn is_deaf(transcript: &Transcript) -> bool {
 struct Reads {
     number: u32,
     others: u32,
-    /// Bits in which any differed from what was expected.
+    /// Bits in which any read differed from the expected value.
     bits: u16,
-    /// The first of a batch was wrong.
+    /// True if the first read of a batch was wrong.
     is_first_wrong: bool,
 }
 
@@ -253,7 +253,7 @@ fn reads(transcript: &Transcript) -> Reads {
     reads
 }
 
-/// True if further reads would say nothing new.
+/// True if further reads would give no new information.
 pub(super) fn reads_are_wrong(transcript: &Transcript) -> bool {
     let Reads { others, is_first_wrong, .. } = reads(transcript);
     others > 0 || is_first_wrong || is_deaf(transcript)
@@ -267,7 +267,7 @@ const FAMILY: [u16; 17] = [
     16495,
 ];
 
-/// All checks, those that show the cause first.
+/// All checks; those that reveal a cause come first.
 #[must_use]
 pub fn checks(transcript: &Transcript) -> Vec<Check> {
     if transcript.is_silent() {
@@ -293,7 +293,7 @@ fn console(transcript: &Transcript) -> Check {
 
 fn link(transcript: &Transcript) -> Check {
     let counters = &transcript.counters;
-    // The port may be opened within a message.
+    // The port may be opened within a message, which is then damaged.
     let damaged = counters.bad_frames.saturating_sub(1) + counters.missing;
     let measured = format!("{} messages, {damaged} lost", counters.frames);
     Check::new("serial link", measured, "none lost", (damaged > 0).then_some(Cause::LinkLoss))
@@ -390,7 +390,7 @@ fn bus_times(transcript: &Transcript) -> Vec<Check> {
     let times = times
         .and_then(|line| Some((number_behind(line, "CS high for ")?, number_behind(line, "read rate: ")?)))
         .filter(|_| !is_deaf(transcript));
-    // At 204.8 SPS the sensor is in normal mode; the board's times are to within 1 us.
+    // At 204.8 SPS the sensor is in normal mode. The board measures times to 1 us.
     let limit = "9 and 40 us at least (Table 2)";
     let times = match times {
         None => Check::not_run("stall, frame to frame", limit),
@@ -402,7 +402,7 @@ fn bus_times(transcript: &Transcript) -> Vec<Check> {
     vec![sck, times]
 }
 
-/// Width of a pulse of data ready, µs.
+/// Width of the data-ready pulse, µs.
 fn pulse_width_us(transcript: &Transcript) -> Option<f64> {
     transcript.lines(Topic::Measurement).find_map(|line| number_behind(line, "DRDY: high for "))
 }
@@ -420,7 +420,7 @@ fn data_ready(transcript: &Transcript) -> Vec<Check> {
         Some((measured, set))
     });
     let rate = match rates {
-        // With every recovery the edges are counted anew.
+        // Each recovery restarts the count of edges, so this check is not run.
         None if pulse_width_us(transcript).is_some() => Check::not_run("data ready", rate_limit),
         None => Check::new("data ready", "too few edges", rate_limit, Some(no_edges.clone())),
         Some((hz, set)) => {
@@ -431,7 +431,7 @@ fn data_ready(transcript: &Transcript) -> Vec<Check> {
     let width = match pulse_width_us(transcript) {
         None => Check::new("its pulse", "none", width_limit, Some(no_edges)),
         Some(us) => {
-            // The board sees the level to within some us.
+            // The board measures the level to within some us.
             let cause = (!(95.0..=205.0).contains(&us)).then_some(Cause::DataReadyWidth);
             Check::new("its pulse", format!("{us} us"), width_limit, cause)
         }
@@ -460,7 +460,8 @@ fn self_test(transcript: &Transcript) -> Vec<Check> {
         let counts = line.split_whitespace().map(str::parse).collect::<Result<Vec<i32>, _>>().ok()?;
         (counts.len() == 6).then_some(counts)
     };
-    // Five deviations of the difference of two means over eight samples of 0.9 deg/s or 9 mg rms (Table 1).
+    // The limits are five deviations of the difference of two means over eight samples of 0.9 deg/s or 9 mg rms (Table
+    // 1).
     let limit = "45 counts of gyros, 7 of accelerometers at least";
     let deflection = match (counts("positive "), counts("negative ")) {
         (Some(positive), Some(negative)) => {
@@ -479,7 +480,8 @@ fn self_test(transcript: &Transcript) -> Vec<Check> {
     vec![passed, deflection]
 }
 
-/// Mean and standard deviation of a channel in a stretch of the raw stream, in its unit; `None` with fewer than two bursts.
+/// Mean and standard deviation of a channel in a part of the raw stream, in its unit; `None` with fewer than two
+/// bursts.
 fn statistics(transcript: &Transcript, topic: Topic, channel: Channel) -> Option<(f64, f64)> {
     let (mut number, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for raw in transcript.raw(topic) {
@@ -501,14 +503,14 @@ fn texts(values: impl IntoIterator<Item = f64>, decimals: usize) -> String {
     values.into_iter().map(|value| format!("{value:.decimals$}")).collect::<Vec<_>>().join(" ")
 }
 
-/// Standard deviations without a filter and behind one of 16 taps, at 819.2 SPS.
+/// Checks the standard deviations without a filter and behind one of 16 taps, at 819.2 SPS.
 fn noise(transcript: &Transcript) -> Vec<Check> {
     let deviation = |topic, channel| statistics(transcript, topic, channel).map(|(_, deviation)| deviation);
     let all = |topic, channels: [Channel; 3]| -> Option<Vec<f64>> {
         channels.into_iter().map(|channel| deviation(topic, channel)).collect()
     };
     let mut checks = Vec::new();
-    // Typical values of Table 1, to within a factor of two.
+    // The limits are a factor of two around the typical values of Table 1.
     for (name, channels, unit, scale, typical) in [
         ("noise of the gyros", GYROS, "deg/s", 1.0, 0.9),
         ("noise of the accelerometers", ACCELEROMETERS, "mg", 1e3, 9.0),
@@ -527,8 +529,8 @@ fn noise(transcript: &Transcript) -> Vec<Check> {
             }
         });
     }
-    // Two averages of N = 16 samples leave sqrt((2N² + 1)/(3N³)) = 0.204 of white noise, to within 5 % in four seconds; rounding to
-    // 3.33 mg adds a fifth to that of the accelerometers.
+    // Two averages of N = 16 samples leave sqrt((2N² + 1)/(3N³)) = 0.204 of white noise, within 5 % in four seconds. Rounding to 3.33 mg
+    // adds a fifth to the value of accelerometers.
     let limit = "0.15 to 0.30 of it (0.204 for white noise)";
     let ratios = || -> Option<Vec<f64>> {
         let channels = GYROS.into_iter().chain(ACCELEROMETERS);
@@ -546,9 +548,9 @@ fn noise(transcript: &Transcript) -> Vec<Check> {
     checks
 }
 
-/// The counters of damaged bursts, and what each says: those first from which others follow.
+/// The counters of damaged bursts with their probable causes; root causes come first.
 fn damage(health: &Health) -> [(&'static str, u32, Cause); 12] {
-    // A burst at an edge that is none comes too soon after the one before.
+    // A burst at a spurious edge comes too soon after the previous one.
     let unless_added = |cause| if health.spurious_edges > 0 { Cause::EdgesAdded } else { cause };
     [
         ("stuck low", health.stuck_low, Cause::LooseData),
@@ -578,7 +580,7 @@ fn bursts(transcript: &Transcript) -> Vec<Check> {
         measured += &format!(", {name} {count}");
     }
     let first = damage.into_iter().find(|(_, count, _)| *count > 0);
-    // The report is made while bursts come in.
+    // Bursts still arrive while the report is made, so a few may be missing.
     let cause = match first {
         Some((_, _, cause)) => Some(cause),
         None if health.data_ready_masked > 0 => Some(Cause::DataReadyFloats),
@@ -613,7 +615,7 @@ fn bursts(transcript: &Transcript) -> Vec<Check> {
             Check::new("supply", format!("{volts:.3} V"), "4.75 to 5.25 V (p. 5)", cause)
         }
     });
-    // Initial biases of 50 mg and 3 deg/s, 1 sigma (Table 1); three of each.
+    // The limits are three times the initial biases of 50 mg and 3 deg/s, 1 sigma (Table 1).
     let means = |channels: [Channel; 3]| -> Option<Vec<f64>> {
         channels.into_iter().map(|channel| Some(statistics(transcript, Topic::Bursts, channel)?.0)).collect()
     };
@@ -645,7 +647,7 @@ fn second_port(transcript: &Transcript) -> Check {
     let Some(heard) = &transcript.second_port else { return Check::not_run(name, limit) };
     let heard: &[Received] = heard;
     let (one, other) = (numbered(transcript.raw(Topic::Bursts)), numbered(raw_messages(heard.iter())));
-    // The streams begin and end within some messages of each other.
+    // The streams begin and end within a few messages of each other.
     let within = |bursts: &BTreeMap<u64, [[u8; 2]; 12]>| {
         let (first, last) = (bursts.keys().next().copied()?, bursts.keys().next_back().copied()?);
         Some((first, last))

@@ -1,4 +1,5 @@
-//! The tables of costs in the documentation of allan-core's calls: what the images count, and the flash that a call adds.
+//! The cost tables in the documentation of allan-core's calls: the counts of the images, and the flash that a call
+//! adds.
 
 use crate::image::{Core, M0_PLUS, M4F};
 use crate::{TOLERANCE, figure};
@@ -6,7 +7,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use system_tests::{generated_within, workspace, writes_docs};
 
-/// Rows of a table: the text of the first cell, and the name of the number.
+/// Rows of a table: the text of the first cell, and the name of the metric.
 const METRICS: [(&str, &str); 9] = [
     ("instructions", "average"),
     ("instructions on average", "average"),
@@ -23,7 +24,7 @@ const METRICS: [(&str, &str); 9] = [
 struct Table {
     call: String,
     rows: Vec<(String, [String; 2])>,
-    /// The code that the table documents.
+    /// The line of code that the table documents.
     documented: String,
 }
 
@@ -66,15 +67,15 @@ fn tables(source: &str) -> Vec<Table> {
     tables
 }
 
-/// The number of a core for a metric of a call; `None` if it is not counted there.
+/// The count of a core for a metric of a call; `None` if it is not counted on that core.
 fn measured(core: Core, call: &str, metric: &str) -> Option<f64> {
     if metric == "flash" {
-        // One core is enough for the size: each image takes seconds to build.
+        // The size is measured on one core only, since each image takes seconds to build.
         let is_m4f = core.target() == driver_footprint::M4F;
         return is_m4f.then(|| f64::from(driver_footprint::call_bytes(driver_footprint::M4F, call)));
     }
     let name = match (call, metric) {
-        // The image that counts records of sensor noise, on the Cortex-M4F alone.
+        // This is the image that counts records of sensor noise, on the Cortex-M4F only.
         ("trace::trace", "average") => "trace_nothing".into(),
         ("trace::trace", "most") => "trace_tone".into(),
         ("trace::trace", "stack") => "trace_tone_stack".into(),
@@ -85,20 +86,20 @@ fn measured(core: Core, call: &str, metric: &str) -> Option<f64> {
     core.counts().get(&name)
 }
 
-/// A count as the tables give it: 1,234 or 12.3 million.
+/// Parses a count of a table: 1,234 or 12.3 million.
 fn number(cell: &str) -> f64 {
     let (digits, factor) = cell.strip_suffix(" million").map_or((cell, 1.0), |digits| (digits, 1e6));
     digits.replace(',', "").parse::<f64>().unwrap_or_else(|_| panic!("{cell} is no number")) * factor
 }
 
-/// A count as a table has it, of three digits.
+/// Writes a count for a table, with three digits.
 fn cell(count: Option<f64>) -> String {
     let Some(count) = count else { return "—".to_owned() };
     let unit = 10_f64.powf((count.max(1.0).log10().floor() - 2.0).max(0.0));
     figure((count / unit).round() * unit)
 }
 
-/// True if a cell has this count. The compiler may change it by a tenth; the least that can be told apart are some instructions or words.
+/// True if a cell has this count. It may change by a tenth with the compiler, or by some instructions or words if it is small.
 fn is_stated(count: Option<f64>, stated: &str) -> bool {
     let is_near = |count: f64| (count - number(stated)).abs() <= TOLERANCE * number(stated) + 16.0;
     count.map_or(stated == "—", is_near)
@@ -143,7 +144,7 @@ pub(crate) fn the_documentation_of_each_call_has_its_costs() {
     write_costs_of_serialize();
 }
 
-/// A derived implementation has no place for a table: it is on the page.
+/// A derived implementation has no place for a table, so its costs are on the page.
 fn write_costs_of_serialize() {
     let mut table = "| `Serialize` | Cortex-M4F | Cortex-M0+ |\n|---|---|---|\n".to_owned();
     for (label, metric) in [("instructions", "average"), ("stack, bytes", "stack"), ("flash, bytes", "flash")] {

@@ -1,9 +1,9 @@
-//! Errors and instructions of libm and micromath on the target, as the table in `allan-core/src/math.rs` gives them.
+//! Errors and instructions of libm and micromath on the target, compared with the table in `allan-core/src/math.rs`.
 
 use crate::image::{Counts, M0_PLUS, M4F};
 use statrs::function::gamma::ln_gamma;
 
-/// The functions of the host's C library, and of statrs.
+/// The reference is the host's C library, or statrs.
 fn reference(name: &str, x: f64) -> f64 {
     match name {
         "sqrt" => x.sqrt(),
@@ -18,13 +18,13 @@ fn reference(name: &str, x: f64) -> f64 {
     }
 }
 
-/// Largest error, relative to the result where that is above 1.
+/// The largest error, relative to the result if that is above 1.
 fn error(counts: &Counts, library: &str, name: &str) -> Option<f64> {
     let function = format!("{library} {name}");
     let results = counts.results.iter().filter(|(name, ..)| *name == function);
     let errors = results.map(|&(_, argument, result)| {
         let (argument, result) = match library {
-            // micromath is given the argument rounded to f32.
+            // micromath gets the argument rounded to f32.
             "micromath" => (f64::from(f64::from_bits(argument) as f32), f64::from(f32::from_bits(result as u32))),
             _ => (f64::from_bits(argument), f64::from_bits(result)),
         };
@@ -36,7 +36,7 @@ fn error(counts: &Counts, library: &str, name: &str) -> Option<f64> {
 
 const NAMES: [&str; 8] = ["sqrt", "ln", "log2", "exp", "expm1", "floor", "abs", "ln_gamma"];
 
-/// The table's row of a function: error and instructions on both cores, of libm and of micromath.
+/// The row of a function in the table: error and instructions on both cores, of libm and of micromath.
 fn row(name: &str) -> Vec<&'static str> {
     let source = include_str!("../../../../allan-core/src/math.rs");
     let start = format!("//! | `{name}` |");
@@ -54,7 +54,7 @@ pub(crate) fn errors_and_instructions_are_those_of_their_table() {
             };
             println!("{library} {name}: error {error:.0e}");
             let documented: f64 = cells[0].parse().expect("an error");
-            // The table has one digit; the last bit may change with the compiler.
+            // The table has one digit, and the last bit may change with the compiler.
             assert!(
                 error <= 1.5 * documented && error >= documented / 4.0,
                 "{library} {name}: {error:.0e}, not {documented:.0e}"
@@ -74,7 +74,7 @@ pub(crate) fn errors_and_instructions_are_those_of_their_table() {
 
 pub(crate) fn both_cores_give_the_same_bits() {
     for ((name, argument, m4f), (.., m0_plus)) in M4F.counts().results.iter().zip(&M0_PLUS.counts().results) {
-        // Also with micromath, as the compiler emits no fused multiply-add for the floating-point unit.
+        // This holds for micromath too, as the compiler emits no fused multiply-add for the floating-point unit.
         assert_eq!(m4f, m0_plus, "{name} of {}", f64::from_bits(*argument));
     }
 }

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 use system_tests::Image;
 
-/// A core, by the target that the image is compiled for and the board that it runs on.
+/// A core: the target for which the image is compiled, and the board on which it runs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Core {
     target: &'static str,
@@ -26,17 +26,17 @@ pub(crate) static M4F: Core = {
 };
 pub(crate) static M0_PLUS: Core = {
     static COUNTS: OnceLock<Counts> = OnceLock::new();
-    // Without a floating-point unit the image `fitting` would take minutes to emulate.
+    // The image `fitting` would take minutes to emulate without a floating-point unit.
     Core { target: "thumbv6m-none-eabi", board: "mps2-an385", images: &["count", "calls"], counts: &COUNTS }
 };
 
 impl Core {
-    /// Rust's target.
+    /// Rust's name of the target.
     pub(crate) fn target(self) -> &'static str {
         self.target
     }
 
-    /// The counts of this core's images, which are run at most once.
+    /// The counts of this core's images, which run at most once.
     pub(crate) fn counts(self) -> &'static Counts {
         self.counts.get_or_init(|| {
             let output = self.images.iter().map(|image| run(&build(self.target, image), self.board));
@@ -49,7 +49,7 @@ impl Core {
 #[derive(Debug)]
 pub(crate) struct Counts {
     numbers: HashMap<String, f64>,
-    /// Library and function, bits of the argument, bits of the result.
+    /// Library with function, bits of the argument, bits of the result.
     pub(crate) results: Vec<(String, u64, u64)>,
 }
 
@@ -82,12 +82,12 @@ impl Counts {
         names.filter(|call| call.contains("::")).collect()
     }
 
-    /// The number that an image printed for this name, if one did.
+    /// The number that an image printed under this name, if it did.
     pub(crate) fn get(&self, name: &str) -> Option<f64> {
         self.numbers.get(name).copied()
     }
 
-    /// The number that an image printed for this name.
+    /// The number that an image printed under this name.
     pub(crate) fn number(&self, name: &str) -> f64 {
         self.get(name).unwrap_or_else(|| panic!("the image printed no {name}"))
     }
@@ -100,8 +100,8 @@ fn build(target: &str, image: &str) -> PathBuf {
     image.build(&format!("counted-{}-{target}", image.program))
 }
 
-/// Runs an image and returns its output. With `-icount shift=0` an instruction takes 1 ns of the board's time, whatever
-/// the load of the machine.
+/// Runs an image and returns its output. `-icount shift=0` makes an instruction take 1 ns of the board's time,
+/// independent of the machine's load.
 fn run(image: &Path, board: &str) -> String {
     let Output { status, stdout, stderr } = Command::new("qemu-system-arm")
         .args(["-M", board, "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=0"])

@@ -1,7 +1,7 @@
 //! Builds the counting images for both cores, runs them in QEMU and compares the counts with bounds and with the documentation.
 //!
-//! The board mps2-an386 has a Cortex-M4F. For the Cortex-M0+, whose board QEMU lacks, the image is compiled for
-//! ARMv6-M and runs on the Cortex-M3 of mps2-an385, which executes the same instructions.
+//! The board mps2-an386 has a Cortex-M4F. QEMU has no board with a Cortex-M0+, so its image is compiled for ARMv6-M and
+//! runs on the Cortex-M3 of mps2-an385, which executes the same instructions.
 
 mod calls;
 mod functions;
@@ -10,10 +10,10 @@ mod image;
 use image::{Counts, M0_PLUS, M4F};
 use system_tests::generated_within;
 
-/// The counts may change by a tenth with the compiler.
+/// Relative change of a count that another compiler may cause.
 const TOLERANCE: f64 = 0.1;
 
-/// One test, as each test may run as a process of its own, and the images take long to run.
+/// All checks are one test: each test may run as its own process, and the images take long to run.
 #[test]
 fn the_counts_of_the_images_are_within_their_bounds_and_in_the_docs() {
     let [m4f, m0_plus] = [M4F.counts(), M0_PLUS.counts()];
@@ -41,11 +41,12 @@ fn the_estimator_is_within_its_budget(m4f: &Counts, m0_plus: &Counts) {
     }
 }
 
-/// A fit or a trace on a Cortex-M4F. The tone is a square wave, which adds two terms: such a trace is about the longest one.
+/// A fit or a trace on a Cortex-M4F. The tone is a square wave that adds two terms, which makes one of the longest
+/// traces.
 struct Fit {
     label: &'static str,
     name: &'static str,
-    /// Bound on the bytes of stack, an interrupt's included.
+    /// Bound on the bytes of stack, including an interrupt's.
     stack: f64,
 }
 
@@ -79,7 +80,7 @@ fn what_the_docs_do_not_state_is_as_measured(m4f: &Counts, m0_plus: &Counts) {
     }
 }
 
-/// A count with three digits from a million on.
+/// A count, with three digits from a million on.
 fn figure(count: f64) -> String {
     let (number, unit) = if count < 1e6 { (count, "") } else { (count / 1e6, " million") };
     let decimals = if unit.is_empty() { 0 } else { (2.0 - number.log10().floor()).max(0.0) as usize };

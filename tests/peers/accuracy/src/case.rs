@@ -4,23 +4,23 @@ use virtual_sensor::{NoiseModel, NoiseSource, OutputRegister};
 
 /// Samples of a series.
 pub(crate) const SAMPLES: usize = 1_000_000;
-/// Seconds between them.
+/// Seconds between samples.
 pub(crate) const SAMPLE_PERIOD: f64 = 0.01;
 /// Number of series that are generated together, one per channel.
 pub(crate) const BATCH: usize = 6;
 
-/// N, B, K; `None` where a method gives no value.
+/// N, B, K; `None` if a method gives no value.
 pub(crate) type Coefficients = [Option<f64>; 3];
 
 /// A mixture of white noise, flicker noise and random walk, in an arbitrary unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case {
     pub(crate) name: &'static str,
-    /// N, B, K.
+    /// The true N, B, K.
     pub(crate) truth: [f64; 3],
 }
 
-/// The curve is lowest where `N²/τ = K²τ/3`: near 100 s, or near 1000 s for the weak random walk.
+/// The cases. A curve has its minimum where `N²/τ = K²τ/3`: near 100 s, or near 1000 s for the weak random walk.
 pub(crate) const CASES: [Case; 3] = [
     Case { name: "S1", truth: [2e-3, 0.0, 3.464e-5] },
     Case { name: "S2", truth: [2e-3, 4e-4, 3.464e-5] },

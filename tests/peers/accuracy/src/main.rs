@@ -109,7 +109,7 @@ fn scores<'a>(scored: &'a mut Vec<(String, Scores)>, name: &str) -> &'a mut Scor
     &mut scored[at].1
 }
 
-/// The terms of the case by their names in `allan-variance`.
+/// The names of the case's terms in `allan-variance`.
 fn python_terms(case: &Case) -> Vec<&'static str> {
     ["white", "flicker", "walk"].into_iter().zip(case.truth).filter(|(_, v)| *v > 0.0).map(|(name, _)| name).collect()
 }

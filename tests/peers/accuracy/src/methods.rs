@@ -1,5 +1,5 @@
-//! The methods that are compared: this project's fit, the crate imu-calib, and the Python packages that `peers.py` runs
-//! in a process of its own.
+//! The compared methods: this project's fit, the crate imu-calib, and the Python packages that `peers.py` runs in its
+//! own process.
 
 use crate::case::{Case, Coefficients, SAMPLE_PERIOD, SAMPLES};
 use allan_core::model::FittedTerm;
@@ -14,7 +14,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// Standard deviation of the white noise in counts. Rounding adds 1/12 count² to its variance, a part in 10⁷.
+/// Standard deviation of the white noise in counts. Rounding adds 1/12 count² to the variance, a part in 10⁷.
 const COUNTS: f64 = 1000.0;
 
 /// This project's fit of `kinds` to the curve of a series; coefficients and bounds are in the unit of the series.
@@ -27,17 +27,17 @@ pub(crate) fn fitted(case: &Case, series: &[f64], kinds: &[NoiseTerm]) -> Model 
     fit(&cascade.curve(SAMPLE_PERIOD), kinds).scaled(lsb)
 }
 
-/// The same model by all samples.
+/// The model fitted to all samples by their likelihood, starting from `model`.
 pub(crate) fn fitted_to_samples(series: &[f64], model: &Model) -> Option<Model> {
     SampleSpectrum::of_samples(&UniformSeries::new(SAMPLE_PERIOD, series.to_vec()), &[])?.fitted(model)
 }
 
-/// The terms of which the case consists.
+/// The terms of the case.
 pub(crate) fn true_kinds(case: &Case) -> Vec<NoiseTerm> {
     NoiseTerm::BASELINE.into_iter().zip(case.truth).filter(|(_, value)| *value > 0.0).map(|(kind, _)| kind).collect()
 }
 
-/// Lower bound on the relative standard error of N, B, K for an unbiased method.
+/// Lower bound of the relative standard error of N, B, K for an unbiased method.
 pub(crate) fn limit(case: &Case) -> [Option<f64>; 3] {
     let truth = Model::new(
         SAMPLE_PERIOD,
@@ -53,7 +53,7 @@ pub(crate) fn fitted_coefficients(model: &Model) -> Coefficients {
     NoiseTerm::BASELINE.map(|kind| model.terms().iter().find(|term| term.kind == kind).map(|term| term.value))
 }
 
-/// Whether the 95 % intervals of N, B, K contain the true value.
+/// True for each of N, B, K whose 95 % interval contains the true value; `None` if the case does not have it.
 pub(crate) fn covered(case: &Case, model: &Model) -> [Option<bool>; 3] {
     let mut truth = case.truth.into_iter();
     NoiseTerm::BASELINE.map(|kind| {
@@ -63,7 +63,7 @@ pub(crate) fn covered(case: &Case, model: &Model) -> [Option<bool>; 3] {
     })
 }
 
-/// N and K by imu-calib, from slopes of the non-overlapping curve; absent where the crate returns an error.
+/// N and K by imu-calib, from slopes of the non-overlapping curve; `None` if the crate returns an error.
 pub(crate) fn imu_calib_coefficients(series: &[f64]) -> Result<Coefficients> {
     let mut estimator = AllanEstimator::with_rate(AllanConfig::default(), 1.0 / SAMPLE_PERIOD)?;
     for (at, &value) in series.iter().enumerate() {
@@ -74,14 +74,14 @@ pub(crate) fn imu_calib_coefficients(series: &[f64]) -> Result<Coefficients> {
     Ok([first(result.noise_density_per_axis(Sensor::Gyro)), None, first(result.random_walk_per_axis(Sensor::Gyro))])
 }
 
-/// A running script of this folder.
+/// A script of this folder that runs.
 pub(crate) struct Python {
     child: Child,
     series: ChildStdin,
     answers: BufReader<ChildStdout>,
 }
 
-/// The coefficients that one method gives for each series of a batch.
+/// The coefficients of one method for each series of a batch.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Answer {
     pub(crate) method: String,
@@ -90,7 +90,7 @@ pub(crate) struct Answer {
 }
 
 impl Python {
-    /// Starts a `script` of this folder with `interpreter`, in whose environment its packages are installed.
+    /// Starts a `script` of this folder with `interpreter`, which must have its packages.
     pub(crate) fn start(interpreter: &str, script: &str) -> Result<Self> {
         let mut child = Command::new(interpreter)
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script))
@@ -103,7 +103,7 @@ impl Python {
         Ok(Self { child, series, answers })
     }
 
-    /// Sends a batch and waits for the answers of every method.
+    /// Sends a batch and waits for the results of every method.
     pub(crate) fn ask(&mut self, batch: &[Vec<f64>], kinds: &[&str]) -> Result<Vec<Answer>> {
         writeln!(self.series, "{} {} {}", batch.len(), batch[0].len(), kinds.join(","))?;
         for series in batch {
@@ -119,7 +119,7 @@ impl Python {
 
 impl Drop for Python {
     fn drop(&mut self) {
-        // It waits for the next batch. An error means that it has ended already.
+        // The script waits for the next batch. An error means that it has already ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

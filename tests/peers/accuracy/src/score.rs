@@ -5,7 +5,7 @@ use crate::case::Coefficients;
 /// The estimates of one coefficient by one method.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Score {
-    /// Relative errors of the series for which the method gave a value.
+    /// Relative errors in the series for which the method gave a value.
     errors: Vec<f64>,
     refused: usize,
     covered: usize,
@@ -30,7 +30,7 @@ impl Score {
         (!self.errors.is_empty()).then(|| self.errors.iter().sum::<f64>() / self.errors.len() as f64)
     }
 
-    /// Root of the mean square of the relative error.
+    /// Root mean square of the relative error; `None` if the method never gave a value.
     pub(crate) fn rmse(&self) -> Option<f64> {
         let square = self.errors.iter().map(|error| error * error).sum::<f64>() / self.errors.len() as f64;
         (!self.errors.is_empty()).then(|| square.sqrt())
@@ -41,7 +41,7 @@ impl Score {
         (self.bounded > 0).then(|| self.covered as f64 / self.bounded as f64)
     }
 
-    /// In percent: the error, its bias, refusals, coverage.
+    /// The cell of a table in percent: error, bias, refusals, coverage.
     pub(crate) fn cell(&self) -> String {
         let series = self.errors.len() + self.refused;
         let mut parts = vec![match (self.rmse(), self.bias()) {

@@ -1,6 +1,6 @@
-//! Prints the time that this crate and two others take per sample and channel, in ns, on the same white noise.
+//! Prints the time per sample and channel of this crate and two others on the same white noise, ns.
 //!
-//! Each is the shortest of several runs, which other load on the machine affects least.
+//! Each time is the shortest of several runs, which other load on the machine affects least.
 
 use allan::{Allan, DataType, Mode, Style};
 use allan_core::Cascade;
@@ -32,7 +32,8 @@ fn counts() -> Vec<i32> {
     (0..SAMPLES).map(|_| die() + die() + die()).collect()
 }
 
-/// Averaging factors 1, 2, 4, 8, 10, 20 … up to a quarter of the record, which are about as many as the octaves.
+/// Estimates at the averaging factors 1, 2, 4, 8, 10, 20 … up to a quarter of the record, about as many as there are
+/// octaves.
 fn record(values: &[f64]) -> Allan {
     let config = Allan::builder().mode(Mode::Cumulative).data_type(DataType::Frequency);
     let mut allan = config.style(Style::Decade1248).max_tau(SAMPLES / 4).build_allan();
@@ -40,7 +41,7 @@ fn record(values: &[f64]) -> Allan {
     allan
 }
 
-/// Six channels at the crate's default of 100 averaging factors.
+/// Estimates six channels at the crate's default of 100 averaging factors.
 fn calibrate(values: &[f64]) -> AllanEstimator {
     let mut estimator = AllanEstimator::with_rate(AllanConfig::default(), RATE_HZ).expect("a rate");
     for (k, &value) in values.iter().enumerate() {

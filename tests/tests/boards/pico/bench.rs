@@ -1,4 +1,4 @@
-//! The image in rp2040js under Node.js, with the virtual sensor on its bus, in the emulator's time.
+//! Runs the image in rp2040js under Node.js, with the virtual sensor on its bus, in the emulator's time.
 
 use super::super::images;
 use adis16405_driver::BURST_BYTES;
@@ -19,7 +19,7 @@ struct Bench {
 }
 
 const TARGET: &str = "thumbv6m-none-eabi";
-/// Longer than the stall of the sensor in either power mode (data sheet Rev. B, Table 2).
+/// Pause longer than the stall of the sensor in either power mode (data sheet Rev. B, Table 2), ns.
 const REST_NS: u64 = 100_000;
 
 impl Bench {
@@ -31,7 +31,7 @@ impl Bench {
     }
 }
 
-/// Built at most once a run; `OBSERVATORY_PICO_IMAGE` names another image.
+/// The image, built at most once per run; `OBSERVATORY_PICO_IMAGE` names another one.
 fn bench() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
@@ -40,7 +40,7 @@ fn bench() -> &'static Bench {
     })
 }
 
-/// The example of a board outside of `firmware`.
+/// The image of the example board outside of `firmware`.
 fn example_bench() -> Bench {
     Bench::new(images::build_package(
         ("example-board", "example-board"),
@@ -56,12 +56,12 @@ fn bench_without_usb() -> Bench {
     Bench::new(images::build_package(("firmware", "observatory-pico"), TARGET, &arguments, "observatory-pico-uart"))
 }
 
-/// The folder with rp2040js, which is installed once, by the first test of several at the same time.
+/// The folder with rp2040js. The first of several simultaneous tests installs it.
 fn emulator() -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let install = || {
         let folder = image_folder().join("rp2040js");
-        // The last file that an installation writes.
+        // An installation writes this file last.
         if !folder.join("node_modules/.package-lock.json").is_file() {
             std::fs::create_dir_all(&folder).expect("a folder");
             let install = Command::new("npm")
@@ -86,7 +86,7 @@ pub(crate) enum Event {
     SensorReset,
     /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
-    /// Data-ready edges do not reach the processor while this is true.
+    /// True while data-ready edges do not reach the processor.
     EdgesLost(bool),
 }
 
@@ -97,35 +97,35 @@ pub(crate) struct Outcome {
     pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
     /// Bytes from the UART, each with its time in ns.
     pub(crate) received: Vec<(u64, u8)>,
-    /// Bytes from the USB port, likewise.
+    /// Bytes from the USB port, each with its time in ns.
     pub(crate) received_by_usb: Vec<(u64, u8)>,
     /// The USB descriptors: vendor and product, their names, the serial number, the current.
     pub(crate) usb_device: String,
-    /// Pulses on the sensor's RST line.
+    /// Number of pulses on the sensor's RST line.
     pub(crate) resets: u32,
-    /// When the program started the boot loader, in ns.
+    /// Time at which the program started the boot loader, in ns.
     pub(crate) boot_loader_at: Option<u64>,
     pub(crate) instructions: u64,
-    /// Changes of the LED's level.
+    /// Number of changes of the LED's level.
     pub(crate) led_changes: u64,
     /// Longest time for which the watchdog was not fed, in s.
     pub(crate) longest_unfed_s: f64,
-    /// SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog, and the pads of GP16 and GP20, at the end.
+    /// Final values of SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog, and the pads of GP16 and GP20.
     pub(crate) registers: Vec<u32>,
     /// Shortest time from one falling edge of chip select to the next while SCK was at most 300 kHz, in ns.
     pub(crate) shortest_slow_read_ns: u64,
-    /// Warnings and errors of the emulator, one a line.
+    /// Warnings and errors of the emulator, one per line.
     pub(crate) diagnostics: String,
 }
 
-/// The board: whether its crystal starts, and what fails once, at a time in s.
+/// The board: its crystal starts or not, and it may have one fault at a time in s.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pico {
     pub(crate) crystal_starts: bool,
     pub(crate) fault: Option<(f64, Fault)>,
-    /// From when on a USB host reads the port, in s; `None` without a host.
+    /// Time from which a USB host reads the port, in s; `None` without a host.
     pub(crate) usb_reads_at: Option<f64>,
-    /// The file with the flash memory that keeps the settings.
+    /// The file with the flash memory for the settings.
     pub(crate) settings: Option<&'static str>,
 }
 
@@ -136,9 +136,9 @@ pub(crate) enum Fault {
     Dma,
     /// The programmed sample period becomes 0.
     Period,
-    /// The exception HardFault.
+    /// The exception HardFault is raised.
     Exception,
-    /// The core executes nothing any more, as after a fault within the handler of faults.
+    /// The core stops executing, as after a fault within the fault handler.
     LockUp,
 }
 
@@ -162,8 +162,8 @@ impl Pico {
     }
 }
 
-/// Boots the image from its UF2 and runs it. A key is given as `TIME=TEXT`, or as `usb:TIME=TEXT` for the USB port; `events` are in order of time. Times are in
-/// s.
+/// Boots the image from its UF2 and runs it. A key is `TIME=TEXT`, or `usb:TIME=TEXT` for the USB port; `events` are in order of time.
+/// Times are in s.
 pub(crate) fn run(
     board: Pico,
     part: VirtualAdis16405,
@@ -174,12 +174,12 @@ pub(crate) fn run(
     run_image(bench(), board, part, seconds, keys, events)
 }
 
-/// As [`run`], with the image of the example of a board.
+/// Runs the image of the example board as [`run`] does.
 pub(crate) fn run_example(part: VirtualAdis16405, seconds: f64, keys: &[&str], events: &[(f64, Event)]) -> Outcome {
     run_image(&example_bench(), SOUND, part, seconds, keys, events)
 }
 
-/// Result of [`run`], with the path of the image: as it is flashed, with a USB host that reads, or without its port on USB.
+/// The result of [`run`] with the path of the image, which has its port on USB and a host that reads, or has none.
 pub(crate) fn run_to_measure(usb: bool, part: VirtualAdis16405, seconds: f64, keys: &[&str]) -> (Outcome, PathBuf) {
     let uart_alone;
     let (bench, board) = if usb {
@@ -245,7 +245,7 @@ fn run_image(
             continue;
         }
         part.advance_to(value as u64);
-        // Events wait for a rest of the bus, since that of the sensor is a frame too: no frame lately, and no sample now or soon. The
+        // An event waits for a rest of the bus, since the sensor's event is a frame too: no recent frame, and no sample now or soon. The
         // emulator sends `n` at least once a millisecond.
         let has_rest = !selected
             && value as u64 >= deselected_at + REST_NS

@@ -1,16 +1,16 @@
-// The functions of the RP2040's boot ROM that the image calls (data sheet, section 2.8.3.1), which rp2040js does not have, and the
-// flash memory behind them. Each is a breakpoint and a return; what it does is done here.
+// The functions of the RP2040's boot ROM that the image calls (data sheet, section 2.8.3.1), which rp2040js lacks, and the flash memory
+// that they program. Each function is a breakpoint and a return in the emulated ROM; its work is done here.
 //
-// Between flash_exit_xip and the second stage of the boot loader the flash takes commands: whatever the program reads from it then
-// is nonsense, as on the board.
+// From flash_exit_xip to the second stage of the boot loader the flash executes commands. As on the board, the program reads wrong
+// values from it during this time.
 
 const TABLE = 0x100, FUNCTIONS = 0x200;
 const NAMES = ['lookup', 'IF', 'EX', 'FC', 'RE', 'RP', 'UB'];
-/// Of the flash memory; any number.
+/// Unique identifier of the flash memory; its value is arbitrary.
 export const UNIQUE_ID = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x0a, 0x12, 0x34];
-// Registers of the SSI, which drives the flash (data sheet, section 4.10.13).
-// Of its memory: what is erased and programmed at once, and the times that it takes (Winbond, W25Q16JV, typical).
+// Bytes of flash that are erased and programmed at once, and the typical times (Winbond W25Q16JV data sheet).
 const SECTOR = 4096, PAGE = 256, ERASE_NS = 45e6, PROGRAM_NS = 400e3;
+// Registers of the SSI, which drives the flash (data sheet, section 4.10.13).
 const SSI = 0x18000, CTRLR0 = 0x00, CTRLR1 = 0x04, SSIENR = 0x08, SR = 0x28, DR0 = 0x60, SPI_CTRLR0 = 0xf4;
 const EEPROM_READ = 3 << 8, READ_UNIQUE_ID = 0x4b, READY = 0x6, RECEIVED = 0x8;
 
@@ -18,14 +18,14 @@ export const load = (mcu, passTime, startBootLoader) => {
   const rom = mcu.bootrom;
   const address = (name) => FUNCTIONS + 4 * NAMES.indexOf(name);
   NAMES.forEach((name, number) => (rom[address(name) / 4] = (0x4770_be00 | number) >>> 0)); // BKPT number; BX LR
-  rom[0x14 / 4] = TABLE; // pointers of 16 bits: table of functions, and of data
+  rom[0x14 / 4] = TABLE; // 16-bit pointers to the tables of functions and of data
   rom[0x18 / 4] = address('lookup') | 1;
 
   const commanded = () => {
     if (!hidden) throw new Error('the flash is read, and takes no command');
     return hidden;
   };
-  let hidden; // the flash while it takes commands
+  let hidden; // content of the flash while it executes commands
   const registers = mcu.core.registers;
   const functions = {
     lookup() {
@@ -72,7 +72,7 @@ export const load = (mcu, passTime, startBootLoader) => {
     if (!hidden) return;
     if (offset === SPI_CTRLR0) configured = true;
     if (offset === SSIENR && value === 1 && configured) {
-      // The second stage has set up reading.
+      // The second stage of the boot loader has set up the flash for reading.
       mcu.flash.set(hidden);
       [hidden, configured] = [undefined, false];
     } else if (offset === DR0 && value === READ_UNIQUE_ID && readRegister(CTRLR0) & EEPROM_READ) {

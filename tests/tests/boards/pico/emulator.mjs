@@ -1,19 +1,29 @@
-// Runs an RP2040 image in rp2040js. The sensor is simulated by the parent process, to which questions go over standard
-// output, and from which answers come over standard input. The frequency of SCK goes with every frame. Arguments: the folder of
-// rp2040js, the image as UF2 and as ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, a fault and its
-// time in s, `none` or the time in s from which a USB host reads the serial port, `none` or a file with the flash memory that keeps
-// the settings, which is written at the end, and keys as TIME=TEXT for the UART and usb:TIME=TEXT. The faults: `none`, `dma` (an error
-// of the channel that receives a burst), `period` (the programmed sample period becomes 0), `exception`, `lockup`. A restart by the watchdog or
-// by the firmware keeps the memory.
+// Runs an RP2040 image in rp2040js. A restart by the watchdog or by the firmware keeps the memory. The parent process simulates the
+// sensor: it reads questions from this program's standard output and writes answers to its standard input.
 //
-// A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `c` has a frequency of SCK in
-// Hz in the place of the time, `s` and `d` are
-// the falling and the rising edge of chip select, `b` and a further byte a transfer over SPI, `u` and a further byte an
-// output of the UART, `v` and a further byte one of the USB port, `x` and a further byte a letter of what its descriptors say, `o`
-// the start of the boot loader, which ends the run, `z` and `Z` the falling and the rising edge of the sensor's RST. At the end follow, in the place of the time, `r` with the registers of which the test asserts bits
-// (SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog, the pads of GP16 and GP20), `l` with the number of changes of the LED, `w` with
-// the longest time in ns for which the watchdog was not fed, and `e` with the number of instructions. The answer to `n` is
-// the number of samples and the time of the next one (two f64), that to `b` a byte; the others have none.
+// Arguments, in this order:
+// - the folder of rp2040js;
+// - the image as UF2 and as ELF, which must agree;
+// - the time to run, s;
+// - `ok` or `dead` for the crystal;
+// - a fault and its time in s: `none`, `dma` (an error of the channel that receives a burst), `period` (the programmed sample period
+//   becomes 0), `exception`, `lockup`;
+// - the time in s from which a USB host reads the serial port, or `none`;
+// - a file with the flash memory for the settings, which is written at the end, or `none`;
+// - keys as TIME=TEXT for the UART and as usb:TIME=TEXT for the USB port.
+//
+// A question is one byte and a number (f64, little-endian), which is a time in ns unless another number is stated:
+// - `n` advances the sensor to the time. The answer is the number of samples and the time of the next one (two f64).
+// - `c` has the frequency of SCK in Hz, before every frame.
+// - `s` and `d` are the falling and the rising edge of chip select.
+// - `b` and a further byte are a transfer over SPI. The answer is a byte.
+// - `u` and a further byte are an output of the UART, `v` and a further byte one of the USB port.
+// - `x` and a further byte are a letter of the USB descriptors' text.
+// - `o` is the start of the boot loader, which ends the run.
+// - `z` and `Z` are the falling and the rising edge of the sensor's RST.
+// At the end follow `r` with each register of which the test asserts bits (SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog,
+// the pads of GP16 and GP20), `l` with the number of changes of the LED, `w` with the longest time in ns for which the watchdog was not
+// fed, and `e` with the number of instructions. Only `n` and `b` have an answer.
 import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -27,8 +37,8 @@ const usbHost = await import(pathToFileURL(path.join(import.meta.dirname, 'usb-h
 
 const PIN_SELECT = 17, PIN_DATA_READY = 20, PIN_RESET = 21, PIN_LED = 25, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
 const PIN_CLOCK = 18, PINS = 0x40014, FUNCTION_SPI = 1; // IO_BANK0 (data sheet, section 2.19.6.1)
-const USB_INTERRUPT = 5; // of the NVIC (data sheet, section 2.3.2)
-const SETTINGS = 0x1f0000; // in flash, to the end of 2 MiB
+const USB_INTERRUPT = 5; // its number in the NVIC (data sheet, section 2.3.2)
+const SETTINGS = 0x1f0000; // offset in flash; the settings end at 2 MiB
 const FLASH = 0x10000000, WATCHDOG = 0x40058;
 const HARD_FAULT = 3; // number of the exception
 const keys = keyArguments.map((key) => {
@@ -42,14 +52,14 @@ const report = (from, text) => diagnostics.set(`${from}: ${text}`, true);
 
 const uf2 = fs.readFileSync(uf2File);
 const elf = fs.readFileSync(elfFile);
-// As the boot loader does, writes the payload of every block (https://github.com/microsoft/uf2) to its address.
+// Writes the payload of every block (https://github.com/microsoft/uf2) to its address, as the boot loader does.
 const program = (mcu) => {
   for (let block = 0; block < uf2.length; block += 512) {
     const [magic0, magic1, , address, size] = [0, 4, 8, 12, 16].map((field) => uf2.readUInt32LE(block + field));
     if (magic0 !== 0x0a324655 || magic1 !== 0x9e5d5157) throw new Error(`no UF2 block at ${block}`);
     mcu.flash.set(uf2.subarray(block + 32, block + 32 + size), address - FLASH);
   }
-  // Compare the loadable segments of the ELF (32 bits, little-endian), which a debug probe would write.
+  // The loadable segments of the ELF (32 bits, little-endian), which a debug probe would write, must be equal.
   for (let i = 0; i < elf.readUInt16LE(44); i++) {
     const header = elf.readUInt32LE(28) + i * 32;
     const [kind, offset, , address, size] = [0, 4, 8, 12, 16].map((field) => elf.readUInt32LE(header + field));
@@ -76,13 +86,13 @@ const ask = (kind, value, byte, answerLength) => {
   return answer;
 };
 
-// What outlasts a restart of the microcontroller: its settings, the time, the sensor's samples, the fault, the counts.
+// These values outlast a restart of the microcontroller: settings, time, samples of the sensor, fault, counts.
 let settings = fs.existsSync(settingsFile) ? fs.readFileSync(settingsFile) : undefined;
 let startedAt = 0, samples = 0, instructions = 0, ledChanges = 0, longestUnfed = 0;
 let faultAt = parseFloat(faultSeconds) * 1e9;
 
-// Runs the microcontroller from its boot to its restart or the end, and returns it. `retained` is the memory before it, which a
-// reset by the watchdog does not clear (Pico SDK, `__uninitialized_ram`); `reason` is the watchdog's register for the cause of its
+// Runs the microcontroller from its boot to its restart or to the end, and returns it. `retained` is the memory before the boot, which
+// a reset by the watchdog does not clear (Pico SDK, `__uninitialized_ram`). `reason` is the watchdog's register with the cause of the
 // reset (RP2040 data sheet, section 4.7.6).
 const run = (retained, reason) => {
   const clock = new SimulationClock();
@@ -95,18 +105,18 @@ const run = (retained, reason) => {
   // The boot ROM copies the second stage to the top of memory and calls it.
   mcu.sram.set(mcu.flash.subarray(0, 252), 0x41f00);
   Object.assign(mcu.core, { SP: 0x20041f00, LR: 0, PC: 0x20041f00 });
-  // The registers with the cause of the reset of the chip, which rp2040js lacks: power-on.
+  // rp2040js lacks these registers with the cause of the chip's reset, which is power-on.
   mcu.peripherals[0x40064] = {
     readUint32: (offset) => (offset === 8 ? 1 << 8 : 0),
     writeUint32() {},
     writeUint32Atomic() {},
   };
   if (crystal === 'dead') {
-    // XOSC STATUS (offset 4) never says that the oscillator is stable.
+    // XOSC STATUS (offset 4) never reports a stable oscillator.
     mcu.peripherals[0x40024] = { readUint32: () => 0, writeUint32() {}, writeUint32Atomic() {} };
   }
 
-  // A pin is pulled down after a reset: an edge of SCK before chip select is driven would be one within a frame.
+  // A pin is pulled down after a reset, so an edge of SCK before chip select is driven would count as an edge within a frame.
   const pins = mcu.peripherals[PINS];
   const writePins = pins.writeUint32.bind(pins);
   pins.writeUint32 = (offset, value) => {
@@ -120,7 +130,7 @@ const run = (retained, reason) => {
   watchdog.reason = reason;
   let restarts = false, lockedUp = false;
   watchdog.onWatchdogTrigger = () => {
-    watchdog.alarm.enable = false; // at 0 it would fire again and again at the same time
+    watchdog.alarm.enable = false; // an enabled alarm at 0 would fire endlessly at the same time
     restarts = true;
   };
   // A write to LOAD (offset 4) feeds the watchdog.
@@ -135,7 +145,7 @@ const run = (retained, reason) => {
   };
 
   const spi = mcu.spi[0];
-  // An error of the bus: the channel halts and raises no interrupt (RP2040 data sheet, section 2.5.7).
+  // After an error of the bus the channel halts and raises no interrupt (RP2040 data sheet, section 2.5.7).
   const failReceiving = () => {
     const channel = mcu.dma.channels[0];
     if (fault !== 'dma' || now() < faultAt || !(channel.ctrl & (1 << 24)) || channel.transCount > 13) return;
@@ -156,7 +166,7 @@ const run = (retained, reason) => {
     if (state === GPIOPinState.High) ask('d', now(), undefined, 0);
   });
   const isDriven = (state) => state === GPIOPinState.Low || state === GPIOPinState.High;
-  // Where it is connected: the part is without supply while RST is low.
+  // On boards that connect RST, the part has no supply while RST is low.
   mcu.gpio[PIN_RESET].addListener((state, before) => {
     if (state === GPIOPinState.Low && before === GPIOPinState.High) ask('z', now(), undefined, 0);
     if (state === GPIOPinState.High && before === GPIOPinState.Low) ask('Z', now(), undefined, 0);
@@ -164,7 +174,7 @@ const run = (retained, reason) => {
   mcu.gpio[PIN_LED].addListener((state, before) => (ledChanges += isDriven(state) && isDriven(before) ? 1 : 0));
   mcu.uart[0].onByte = (byte) => ask('u', now(), byte, 0);
 
-  // Data ready: a pulse at every sample. The time of the next one is asked for at least every STRIDE_NS, as settings may
+  // Data ready has a pulse at every sample. The time of the next sample is requested at least every STRIDE_NS, since settings may
   // change it.
   const edge = clock.createAlarm(() => {
     const answer = ask('n', now(), undefined, 16);
@@ -177,8 +187,8 @@ const run = (retained, reason) => {
     edge.schedule(Math.max(1, Math.min(next - now(), STRIDE_NS)));
   });
   edge.schedule(1);
-  // The processor clears a pending interrupt when it enters the handler, and sets it again if its line is still active when it
-  // returns. rp2040js clears it with the line alone, so that a request of the program, which the USB port makes, would never end.
+  // The processor clears a pending interrupt when it enters the handler, and sets it again if the line is still active when the handler
+  // returns. rp2040js clears it only with the line, so an interrupt requested by the program, as for the USB port, would never end.
   const { core } = mcu;
   const [enter, leave] = [core.exceptionEntry.bind(core), core.exceptionReturn.bind(core)];
   core.exceptionEntry = (number) => {
@@ -206,19 +216,19 @@ const run = (retained, reason) => {
     end = 0;
   });
 
-  // Faults of the processor, which happen between two instructions.
+  // Faults of the processor occur between two instructions.
   const fail = {
-    // Every aligned word pair that is the programmed period in 1/256 us becomes 0, by which the firmware then divides.
+    // Every aligned pair of words with the programmed period in 1/256 us becomes 0, so the firmware divides by 0.
     period() {
       const memory = new BigUint64Array(mcu.sram.buffer);
       memory.forEach((value, index) => (memory[index] = value === 1_250_000n ? 0n : value));
     },
     exception: () => mcu.core.exceptionEntry(HARD_FAULT),
-    // As after a fault within the handler of faults: no instruction is executed any more.
+    // The core executes no further instruction, as after a fault within the fault handler.
     lockup: () => (lockedUp = true),
   }[fault];
   while (now() < end && !restarts) {
-    // A core that sleeps executes nothing that could fail.
+    // A sleeping core executes no instruction that could fail.
     if (fail && now() >= faultAt && !mcu.core.waiting) {
       faultAt = Infinity;
       fail();

@@ -1,26 +1,26 @@
-// A USB host on the controller of rp2040js: it resets the bus, enumerates the device, opens its serial port as a terminal does,
+// A USB host on the controller of rp2040js. It resets the bus, enumerates the device, opens its serial port as a terminal does,
 // and reads the port from a given time on. It does not set the line coding, suspend the bus, or unplug the device.
 //
-// Requests are those of USB 2.0, section 9.4, and of its class for communication devices (PSTN 1.2, section 6.3.12).
+// The requests are defined in USB 2.0, section 9.4, and in its class for communication devices (PSTN 1.2, section 6.3.12).
 
 const DEVICE = 1, CONFIGURATION = 2, STRING = 3, ENDPOINT = 5, INTERFACE = 4;
 const ENGLISH = 0x0409, DATA_CLASS = 10, BULK = 2;
 const DELAY_NS = 100_000;
 const PACKET_NS = 52_632; // at most 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9)
-const AVAILABLE = 1 << 10; // of a buffer control register (RP2040 data sheet, section 4.1.4)
+const AVAILABLE = 1 << 10; // bit of a buffer control register (RP2040 data sheet, section 4.1.4)
 
 const read = (type, request, value, index, length) => ({ bytes: [type | 0x80, request, value, index, length], length });
 const write = (type, request, value, index) => ({ bytes: [type, request, value, index, 0], length: 0 });
 const descriptor = (kind, number, length, language = 0) => read(0, 6, (kind << 8) | number, language, length);
 
-/// `readsFrom` is in ns; `found` is called with what the descriptors say, `received` with the bytes of a packet. The function that
-/// is returned sends text to the port.
+/// Connects a host that reads the port from `readsFrom` on, in ns. `found` is called with the text of the descriptors, `received` with
+/// the bytes of each packet. Returns the function that sends text to the port.
 export const connect = (mcu, clock, readsFrom, found, received) => {
   const usb = mcu.usbCtrl;
   let control, answer = [], inEndpoint = -1, outEndpoint = -1, pending = [];
-  const ready = new Map(); // bytes that each endpoint takes, where it takes some
+  const ready = new Map(); // number of bytes that each endpoint accepts, if it accepts any
 
-  // Each `yield` makes a request and gives its answer.
+  // Each `yield` sends a request; its value is the answer.
   function* enumerate() {
     yield write(0, 5, 1, 0); // SET_ADDRESS
     const device = Buffer.from(yield descriptor(DEVICE, 0, 18));
@@ -76,7 +76,7 @@ export const connect = (mcu, clock, readsFrom, found, received) => {
     ready.set(endpoint, size);
     send();
   };
-  // The controller of rp2040js takes a packet as soon as it is there; here it waits until the host reads, and for its place in a frame.
+  // The controller of rp2040js takes a packet at once. Here the packet waits until the host reads, and for its place in a frame.
   const updated = usb.DPRAMUpdated.bind(usb);
   usb.DPRAMUpdated = (offset, value) => {
     if (offset !== 0x80 + 8 * inEndpoint || !(value & AVAILABLE)) updated(offset, value);

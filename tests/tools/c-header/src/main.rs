@@ -1,4 +1,5 @@
-//! Prints the header of allan-core for C: `c-header allan-core/ffi FILE.rs…`, the folder with `cbindgen.toml` and the sources in their order.
+//! Prints the C header of allan-core: `c-header allan-core/ffi FILE.rs…`, with the folder of `cbindgen.toml` and the sources in their
+//! order.
 
 use std::error::Error;
 use std::io::stdout;

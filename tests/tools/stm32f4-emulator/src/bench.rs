@@ -1,4 +1,4 @@
-//! An emulated STM32F427, which has what the STM32F405 has and more, with a crystal, a sensor and a terminal.
+//! An emulated STM32F427, a superset of the STM32F405, with a crystal, a sensor and a terminal.
 
 use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise, read, write};
 use crate::probe::Probe;
@@ -24,7 +24,7 @@ use std::num::{NonZeroU32, NonZeroU64};
 use std::path::Path;
 
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
-/// Instructions a second of a slow core.
+/// Instructions per second of a slow core.
 const SLOW_HZ: NonZeroU64 = NonZeroU64::new(21_000_000).unwrap();
 const SUPPLY_MV: u32 = 3300;
 const CHIP_SELECT: u8 = 4; // PA4
@@ -37,9 +37,9 @@ const TIM2RST: u64 = 1;
 /// transfer (RM0090 section 10.5.5).
 const DMA2_S0CR: u64 = 0x4002_6410;
 const TCIE: u64 = 1 << 4;
-/// Its bit that lets the stream run.
+/// The bit of that register that enables the stream.
 const EN: u64 = 1;
-/// Registers that a run returns beside those of the ports.
+/// Registers that a run returns in addition to those of the ports.
 const CONFIGURATION: [u64; 12] = [
     FLASH_SR,
     FLASH_CR,
@@ -54,9 +54,9 @@ const CONFIGURATION: [u64; 12] = [
     DBGMCU_APB1_FZ,
     SYSCFG_MEMRMP,
 ];
-/// Longest time that the emulator runs between two looks at the sensor's clock and the events.
+/// Longest time that the emulator runs before it checks the sensor's clock and the events, ns.
 const STRIDE_NS: u64 = 1_000_000;
-/// Length of the data-ready pulse.
+/// Length of the data-ready pulse, ns.
 const PULSE_NS: u64 = 100_000;
 
 #[derive(Debug)]
@@ -120,14 +120,14 @@ impl Board for Bench {
     }
 }
 
-/// Runs the emulator in stretches that end where the sensor's data-ready line changes, and carries out the events.
+/// Runs the emulator up to each change of the sensor's data-ready line, and executes the events.
 struct Plant {
     end: u64,
     /// Time in ns at which the data-ready pulse under way ends.
     pulse_end: Option<u64>,
-    /// Samples of the sensor at the last stop.
+    /// Number of the sensor's samples at the last stop.
     samples: u64,
-    /// Data-ready edges still to be withheld from the processor.
+    /// Number of data-ready edges still to be withheld from the processor.
     edges_to_lose: u64,
     /// Time in ns until which the data-ready line oscillates, and its level.
     oscillates_until: u64,
@@ -146,7 +146,7 @@ impl Plant {
     fn next_stop(&self, bench: &mut Bench, now: u64) -> VirtualNanos {
         let ready = bench.sensor().map_or(u64::MAX, |sensor| sensor.part.next_data_ready());
         let next = ready.min(self.pulse_end.unwrap_or(u64::MAX)).min(now + STRIDE_NS).min(self.end);
-        // Within a frame the sensor is a byte behind, so that its next edge may lie in the past.
+        // Within a frame the sensor is one byte behind, so its next edge may lie in the past.
         VirtualNanos(next.max(now + 1_000))
     }
 
@@ -212,7 +212,7 @@ impl Driver<Bench> for Plant {
             }
             return None;
         }
-        // Events wait for the end of a frame, as some of them send the sensor a frame of their own.
+        // Events wait for the end of a frame, since some of them send the sensor a frame.
         let between_frames =
             |session: &mut Session<Bench>| session.board_mut().sensor().is_none_or(|sensor| !sensor.selected);
         while between_frames(session)
@@ -222,7 +222,7 @@ impl Driver<Bench> for Plant {
         }
         let pulse_ended = self.pulse_end.take_if(|end| now >= *end).is_some();
         if pulse_ended && self.burst_fault != 0 {
-            // The burst is still under way: it lasts longer than the pulse.
+            // The burst is still under way, since it lasts longer than the pulse.
             clear_bits(session, host, DMA2_S0CR, std::mem::take(&mut self.burst_fault));
         }
         let bench = session.board_mut();

@@ -1,5 +1,5 @@
-//! Runs an image for the STM32F405: `stm32f4-emulator IMAGE.elf`, with a [`Scenario`] in its standard input and its
-//! [`Outcome`](emulation::Outcome) in its standard output.
+//! Runs an image for the STM32F405: `stm32f4-emulator IMAGE.elf`, with a [`Scenario`] on standard input and its
+//! [`Outcome`](emulation::Outcome) on standard output.
 
 mod bench;
 mod microcontroller;

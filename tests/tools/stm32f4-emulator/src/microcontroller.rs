@@ -1,5 +1,5 @@
-//! The emulated STM32F427 with what the emulator has no model for: the external interrupt controller, resets by the
-//! supply, and damage to memory and registers.
+//! The emulated STM32F427, extended by parts without a model in the emulator: the external interrupt controller, resets
+//! by the supply, and damage to memory and registers.
 
 use rigless::device::{Device, DeviceContext, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::emulator::{Access, AccessKind, Host};
@@ -12,11 +12,11 @@ use rigless::soc::stm32f427::{Stm32f427, peripherals::gpio::Pin};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
-/// RM0090 section 2.3.1: SRAM1 and SRAM2, and the core-coupled memory.
+/// Addresses of SRAM1 and SRAM2, and of the core-coupled memory (RM0090 section 2.3.1).
 pub(crate) const RAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
 const CORE_COUPLED: std::ops::Range<u64> = 0x1000_0000..0x1001_0000;
 const LINES: usize = 5;
-/// Position of EXTI0 among the interrupts that the emulator's table gives the instance; EXTI1 and so on follow it.
+/// Position of EXTI0 among the interrupts of the instance in the emulator's table; EXTI1 and so on follow it.
 const FIRST_INTERRUPT: usize = 1;
 
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub(crate) struct Microcontroller {
     exti: Exti,
     exti_slot: usize,
     rcc_slot: usize,
-    /// True if the next reset is reported as one by the supply.
+    /// True if the next reset is reported as a reset by the supply.
     pub(crate) brown_out: bool,
     /// True if the crystal oscillator never becomes ready.
     pub(crate) crystal_fails: bool,
@@ -37,7 +37,7 @@ impl Microcontroller {
         Ok(Self { part, exti: Exti::default(), exti_slot, rcc_slot, brown_out: false, crystal_fails: false })
     }
 
-    /// Sets the level of a pin of a port, and of the interrupt line of its number.
+    /// Sets the level of a pin of a port, and of the interrupt line with its number.
     pub(crate) fn drive_pin(&mut self, at: VirtualNanos, port: usize, pin: u8, high: bool) {
         let level = if high { Level::High } else { Level::Low };
         self.part.drive_port(at, port, |port, registers, context| {
@@ -132,7 +132,7 @@ pub(crate) fn fill_memory_with_noise(host: &mut dyn Host) {
     }
 }
 
-/// Sets every aligned pair of words that holds `value` to 0; there must be one.
+/// Sets every aligned pair of words that holds `value` to 0. There must be one.
 pub(crate) fn clear_in_memory(host: &mut dyn Host, value: u64) {
     let mut cleared = 0;
     for address in RAM.step_by(8) {

@@ -1,4 +1,4 @@
-//! A debug probe: it reads the log that an image leaves in its memory (RTT).
+//! A debug probe that reads the log (RTT) in the memory of an image.
 
 use crate::microcontroller::RAM;
 use defmt_decoder::{DecodeError, Table};
@@ -9,17 +9,16 @@ use std::path::Path;
 
 /// The first words of the block by which a probe finds the buffers: "SEGGER R".
 const IDENTIFIER: [u64; 2] = [0x4747_4553, 0x5220_5245];
-/// Offsets of the first buffer of bytes from the target in the block: its address, its size, and the offsets to which the target has
-/// written and the probe has read.
+/// Offsets in the block of the first buffer from the target: address, size, write offset of the target, read offset of the probe.
 const BUFFER: u64 = 28;
 const SIZE: u64 = 32;
 const WRITTEN: u64 = 36;
 const READ: u64 = 40;
-/// Offset of the mode of that buffer, and the mode in which the target waits for the probe while it is full.
+/// Offset of the mode of that buffer, and the mode in which the target waits while the buffer is full.
 const MODE: u64 = 44;
 const BLOCKS: u64 = 2;
 
-/// Takes the bytes of the log out of the memory of the image, as often as it is asked to.
+/// Reads the bytes of the log from the memory of the image at each call.
 #[derive(Debug)]
 pub(crate) struct Probe {
     conduct: Conduct,
@@ -49,7 +48,7 @@ impl Probe {
         }
         host.write(block + READ, Width::W32, read).expect("memory");
     }
-    /// The lines of the log that the bytes hold, by the table of formats in the image.
+    /// The lines of the log in these bytes, by the table of formats in the image.
     pub(crate) fn lines(&self, image: &Path) -> Vec<LogLine> {
         let elf = std::fs::read(image).expect("the image");
         let table = Table::parse(&elf).expect("an ELF").expect("a table of formats");

@@ -1,5 +1,5 @@
-//! The devices that are connected to the microcontroller: the virtual sensor at its chip select, and a terminal at the
-//! serial port, both in the emulator's time.
+//! The devices connected to the microcontroller: the virtual sensor at its chip select, and a terminal at the serial
+//! port, both in the emulator's time.
 
 use emulation::{BusRecord, SCK_HZ, SLOW_SCK_HZ};
 use rigless::chip::{Timeline, spi, uart};
@@ -24,9 +24,9 @@ pub(crate) struct Sensor {
 }
 
 impl Sensor {
-    /// The emulator reports a byte at its end, while the part is told when it began: it is taken to have lasted eight
-    /// periods of [`SCK_HZ`] or, by the time of the first byte of its frame, of [`SLOW_SCK_HZ`].
-    /// [`BusRecord::shortest_byte_ns`] shows how long it really lasted.
+    /// The emulator reports a byte at its end, but the part needs the time of its begin. A byte counts as eight periods
+    /// of [`SCK_HZ`] or, by the time of the first byte of its frame, of [`SLOW_SCK_HZ`].
+    /// [`BusRecord::shortest_byte_ns`] has the true duration.
     pub(crate) fn new(mut part: VirtualAdis16405) -> Self {
         part.set_sck_hz(Some(SCK_HZ));
         Self {
@@ -48,13 +48,13 @@ impl Sensor {
         }
     }
 
-    /// Record of the sensor until now.
+    /// The record of the sensor so far.
     pub(crate) fn record(&self) -> BusRecord {
         let violations = self.part.violations().iter().map(ToString::to_string).collect();
         BusRecord { samples: self.part.samples(), violations, ..self.record.clone() }
     }
 
-    /// Advances the part to a time in ns. Within a frame it stays one byte behind, as a byte is reported at its end.
+    /// Advances the part to a time in ns. Within a frame it stays one byte behind, since a byte is reported at its end.
     pub(crate) fn advance_to(&mut self, now: u64) {
         self.part.advance_to(if self.selected { now.saturating_sub(self.byte_ns) } else { now });
     }

@@ -1,4 +1,4 @@
-//! An effect in samples that were measured.
+//! Adds an effect to measured samples.
 
 use crate::undeclared::effect::EffectKind;
 use crate::undeclared::environment::EnvironmentCourse;
@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use virtual_sensor::{InjectedEffect, OutputRegister};
 
-/// Effect, repeated samples; channel `n` has `DITHER + n`.
+/// Random streams: of the effect, of repeated samples, and `DITHER + n` of channel `n`.
 const EFFECT: u64 = 1 << 32;
 const REPEATED: u64 = EFFECT + 1;
 const DITHER: u64 = EFFECT + 2;
@@ -22,7 +22,7 @@ pub(super) enum HiddenEffect {
 }
 
 impl HiddenEffect {
-    /// An effect without channels is in all.
+    /// True if the effect is in the channel; an effect without channels is in all.
     pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
         match self {
             Self::Known(_, effect) => effect.channels().is_empty() || effect.channels().contains(&channel),
@@ -31,10 +31,11 @@ impl HiddenEffect {
     }
 }
 
-/// Distance in samples of chance equality.
+/// Distance in samples at which samples are equal only by chance.
 const BY_CHANCE: usize = 64;
 
-/// `stretch` with an effect, dithered and rounded again, so that size 0 changes none; repeated samples stay repeated.
+/// `stretch` with an effect. It is dithered and rounded again, so that size 0 changes no count. Repeated samples stay
+/// repeated.
 pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> Measurement {
     let mut changed = stretch.clone();
     match effect {
@@ -62,7 +63,8 @@ pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> M
     changed
 }
 
-/// Repeated samples: all channels of `quantity` equal the sample before, twice as often as at [`BY_CHANCE`].
+/// The repeated samples, which equal the previous sample in all channels of `quantity`. There are none unless such
+/// samples are twice as frequent as at the distance [`BY_CHANCE`].
 fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
     let of_quantity = || stretch.channels.iter().filter(|channel| channel.profile.quantity == quantity);
     let is_equal = |at: usize, distance: usize| {
@@ -84,7 +86,7 @@ fn random(seed: u64, stream: u64) -> ChaCha8Rng {
     random
 }
 
-/// In the sample periods `slots`.
+/// Adds the effect to a channel with the sample periods `slots`.
 fn change_channel(
     channel: &mut MeasuredChannel,
     slots: &[u64],
@@ -96,7 +98,7 @@ fn change_channel(
     let lsb = channel.profile.lsb;
     let mut dither = random(seed, DITHER + output as u64);
     let continuous = |count: i32, dither: &mut ChaCha8Rng| lsb * (f64::from(count) + dither.random_range(-0.5..0.5));
-    // A gap holds the last value.
+    // A gap keeps the last value.
     let mut values: Vec<f64> = Vec::new();
     for (&slot, &count) in slots.iter().zip(&channel.counts) {
         let value = continuous(count, &mut dither);
@@ -125,7 +127,7 @@ fn change_channel(
     channel.counts = slots.iter().map(|&slot| counts[slot as usize]).collect();
 }
 
-/// With the probability `share`, in every channel.
+/// Repeats samples in every channel with the probability `share`.
 fn repeat_samples(measurement: &mut Measurement, share: f64, seed: u64) {
     let mut random = random(seed, REPEATED);
     for at in 1..measurement.len() {
@@ -135,7 +137,7 @@ fn repeat_samples(measurement: &mut Measurement, share: f64, seed: u64) {
     }
 }
 
-/// Unknown in a recording of noise.
+/// An environment without changes, since a recording of noise does not have one.
 pub(super) fn no_environment() -> EnvironmentCourse {
     EnvironmentCourse { temperature_c: Vec::new(), supply_v: Vec::new(), force_g: [const { Vec::new() }; 3] }
 }

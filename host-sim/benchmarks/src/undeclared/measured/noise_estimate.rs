@@ -1,4 +1,4 @@
-//! N, B and K of measured noise and N's filter: Whittle's fit to band medians, which lines hardly move.
+//! N, B and K of measured noise and the filter of N: Whittle's fit to medians of bands, which lines hardly change.
 
 use crate::undeclared::channel_under_test::{Densities, baseline_densities, fit_baseline, low_pass_gain};
 use adis16405_driver::Channel;
@@ -7,18 +7,18 @@ use std::f64::consts::PI;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
 const BANDS_PER_OCTAVE: f64 = 6.0;
-/// Fewest ordinates of a band.
+/// Least number of ordinates in a band.
 const FEWEST: usize = 5;
-/// Corners: the highest over half the sample rate, and the ratio of neighbours.
+/// Corners that are tried: the highest over half the sample rate, their number, and the ratio of neighbours.
 const HIGHEST_CORNER: f64 = 1.5;
 const CORNERS: usize = 24;
 const CORNER_RATIO: f64 = 1.15;
 const LEAST_GAIN: f64 = 10.0;
 
-/// For gyros and accelerometers.
+/// The noise of the gyros and accelerometers of a recording.
 pub(super) struct NoiseEstimate {
     pub(super) model: NoiseModel,
-    /// By channel, Hz; infinite without a filter.
+    /// Corner of each channel's white noise, Hz; infinite without a filter.
     pub(super) corners_hz: [f64; 12],
     pub(super) channels: Vec<OutputRegister>,
 }
@@ -39,19 +39,19 @@ pub(super) fn noise_estimate(samples: &Measurement) -> NoiseEstimate {
     NoiseEstimate { model, corners_hz, channels }
 }
 
-/// In the channel's unit.
+/// The values of a channel in its unit.
 fn values(channel: &MeasuredChannel) -> Vec<f64> {
     channel.counts.iter().map(|&count| f64::from(count) * channel.profile.lsb).collect()
 }
 
-/// N, B, K and N's corner, Hz, of values rounded to `resolution`; `None` of a constant.
+/// N, B, K and the corner of N in Hz, of values rounded to `resolution`; `None` if the values are constant.
 fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<([f64; 3], f64)> {
     let bands = bands(values, period_s)?;
     let rounding = resolution * resolution / 12.0 * period_s;
     let counts: Vec<f64> = bands.iter().map(|band| band.ordinates).collect();
-    // From the highest frequencies.
+    // The white noise is first estimated from the highest frequencies.
     let white = bands.last().map_or(0.0, |band| band.density);
-    // And log likelihood up to a constant.
+    // The fit for a corner: coefficients, corner, and log likelihood up to a constant.
     let fit = |corner_hz: f64| {
         let of_band = |band: &Band| {
             let [white, flicker, walk] = baseline_densities(period_s, band.frequency_hz);
@@ -77,12 +77,12 @@ fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<([f64;
 
 struct Band {
     frequency_hz: f64,
-    /// Two-sided, unit²/Hz.
+    /// Two-sided density, unit²/Hz.
     density: f64,
     ordinates: f64,
 }
 
-/// Medians over their bias, under Hann's window, without the lowest two ordinates.
+/// The densities of bands: medians over their bias, under Hann's window, without the lowest two ordinates.
 fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
     let length = values.len();
     let mean = values.iter().sum::<f64>() / length as f64;
@@ -94,7 +94,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
     let transform = fourier::forward(length);
     let mut output = transform.make_output_vec();
     transform.process(&mut input, &mut output).ok()?;
-    // Mean square 3/8.
+    // The window has a mean square of 3/8.
     let scale = period_s / (0.375 * length as f64);
     let mut from = 2;
     let mut bands = Vec::new();
@@ -104,7 +104,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
         let mut ordinates: Vec<f64> = output[from..to].iter().map(|bin| scale * bin.norm_sqr()).collect();
         ordinates.sort_by(f64::total_cmp);
         let middle = ordinates.len() / 2;
-        // 1/n + 1/(n − 1) + … for exponential order statistics.
+        // The expected median of exponential variables is 1/n + 1/(n − 1) + …
         let expected: f64 = (ordinates.len() - middle..=ordinates.len()).map(|left| 1.0 / left as f64).sum();
         bands.push(Band {
             frequency_hz: 0.5 * (from + to - 1) as f64 / (length as f64 * period_s),
@@ -126,7 +126,7 @@ mod tests {
     use std::f64::consts::TAU;
     use virtual_sensor::ChannelNoise;
 
-    /// N to 1 %, B and K to a fifth over 8 seeds; the line has ten standard deviations.
+    /// Over 8 seeds N is known to 1 %, B and K to a fifth. The line has ten standard deviations.
     #[test]
     fn the_coefficients_are_those_of_the_noise_in_spite_of_a_line() {
         let truth = [0.02, 0.03, 0.01];
@@ -151,7 +151,7 @@ mod tests {
         assert!(ratios.iter().zip(allowed).all(|(ratio, allowed)| (ratio - 1.0).abs() < allowed), "{ratios:?}");
         assert_eq!(coefficients(&[1.0; 100], 0.01, 1.0), None);
     }
-    /// 2·N²/(1 + (f/f₀)²).
+    /// The density is 2·N²/(1 + (f/f₀)²).
     #[test]
     fn the_filter_of_the_noise_is_found() {
         let (n, truth_hz) = (0.004, 45.0);
@@ -160,7 +160,7 @@ mod tests {
             let density = |frequency: f64| 2.0 * n * n / (1.0 + (frequency / truth_hz).powi(2));
             let values = gaussian_noise(density, 250.0, 12_000, &mut random);
             let ([found, ..], corner_hz) = coefficients(&values, 0.004, 1e-4).expect("noise");
-            // Corners are 15 % apart.
+            // The corners that are tried are 15 % apart.
             assert!((corner_hz / truth_hz).ln().abs() < 0.15, "{corner_hz}");
             assert!((found / n - 1.0).abs() < 0.1, "{found}");
         }

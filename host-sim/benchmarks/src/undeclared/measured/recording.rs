@@ -19,7 +19,7 @@ pub struct NoiseRecording {
     pub samples: Measurement,
 }
 
-/// Why a recording cannot be used.
+/// The reason for which a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeasuredNoiseError {
@@ -29,18 +29,18 @@ pub enum MeasuredNoiseError {
     Moving(String),
     #[error("{file}: {reason}")]
     TimeBase {
-        /// The file, as it was named.
+        /// The file, as given by the user.
         file: String,
         reason: TimeBaseError,
     },
 }
 
 impl NoiseRecording {
-    /// Reads register counts completely, other files in their longest part at rest. `rate_hz` is for files without
-    /// stamps; missing columns and units are proposed by the inspection.
+    /// Reads all of a recording of register counts, or the longest part at rest of any other file. `rate_hz` is for
+    /// files without time stamps. The inspection proposes missing columns and units.
     ///
     /// # Errors
-    /// The file cannot be read, neither its time stamps nor `rate_hz` tell the sample rate, or the sensor is never at
+    /// The file cannot be read, neither its time stamps nor `rate_hz` give the sample rate, or the sensor is never at
     /// rest.
     pub fn read(file: &Path, rate_hz: Option<f64>) -> Result<Self, MeasuredNoiseError> {
         let file_name = || file.display().to_string();
@@ -70,17 +70,17 @@ impl NoiseRecording {
     }
 }
 
-/// Proposal for the only sensor, and its time at rest.
+/// The proposal for the only sensor, and its time at rest.
 fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions, Option<TimeRange>) {
     let mut proposals = tables.iter().flat_map(|table| table.proposals.iter().map(move |proposal| (table, proposal)));
     let (mut selection, mut topic, mut rest) = (ColumnSelection::default(), None, None);
-    // The reader's error asks which of several.
+    // With several proposals the reader's error names them.
     if let (Some((table, proposal)), None) = (proposals.next(), proposals.next()) {
         selection = ColumnSelection::parse(&proposal.columns, &proposal.units).unwrap_or_default();
         topic.clone_from(&proposal.topic);
         rest = table.steady.as_ref().filter(|steady| steady.rows.len() < table.rows).and_then(
             |SteadyPart { rows, .. }| {
-                // At the user's rate if the file has none.
+                // Rows are converted at the user's rate if the file has none.
                 let [from, to] = [rows.start, rows.end].map(|row| row as f64);
                 let by_rate = |rate_hz: f64| TimeRange { from_s: from / rate_hz, to_s: to / rate_hz };
                 table.steady_s.or_else(|| rate_hz.map(by_rate))
@@ -90,7 +90,7 @@ fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions,
     (ReadOptions { sensor: SensorProfile::generic(), selection, topic }, rest)
 }
 
-/// By stamps, or at `rate_hz`.
+/// Sets the time base by time stamps, or at `rate_hz`.
 fn with_rate(
     rate_hz: Option<f64>,
     open: impl Fn(Option<f64>) -> Result<SampleStream, StreamError>,

@@ -10,20 +10,17 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Effect, ModelReport, 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Deviance per point of a failing model.
-pub(super) const FAILS: f64 = 3.0;
-
-/// Deviances per point on the unseen half, in the effect's first channel; absent for too few samples.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// Deviances per point on the unseen half, in the effect's first channel; absent if there are too few samples.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct MeasuredErrors {
     pub before: Option<f64>,
     pub after: Option<f64>,
-    /// Deviance without what the first half's rules exclude.
+    /// Deviances without the samples that the rules of the first half exclude.
     pub excluding: [Option<f64>; 2],
-    /// Curve of the first half as a model.
+    /// Deviance of the first half's curve, used as a model.
     pub first_half_curve: Option<f64>,
     pub untouched_before: Option<f64>,
-    /// With added terms, untouched.
+    /// Deviance with added terms in the untouched stretch.
     pub untouched_after: Option<f64>,
 }
 
@@ -31,17 +28,17 @@ pub struct MeasuredErrors {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasuredScore {
     pub recording: String,
-    /// s from the recording's first sample.
+    /// Start of the stretch, s from the recording's first sample.
     pub from_s: f64,
     pub kind: HiddenKind,
     pub channels: Vec<&'static str>,
     /// Size over detection limit.
     pub strength: f64,
-    /// Named; outside the vocabulary also `unexplained`.
+    /// True if the effect is named; outside the vocabulary also if it is reported as `unexplained`.
     pub named: bool,
-    /// Report on the effect's channels, `channel: kind`.
+    /// Findings on the effect's channels, as `channel: kind`.
     pub found: Vec<String>,
-    /// Names beyond those of the untouched stretch and the right one, `channel: kind`.
+    /// Wrong names that the untouched stretch does not have, as `channel: kind`.
     pub wrong_names: Vec<String>,
     pub estimates: Vec<ParameterScore>,
     pub errors: MeasuredErrors,
@@ -55,7 +52,7 @@ pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEff
     };
     let own: Vec<Channel> = Channel::INERTIAL.into_iter().filter(is_in).collect();
     let (named, right, estimates) = answer(kind, effect, strength, &own, &report, &stretch.report);
-    let errors = own.first().map_or_else(MeasuredErrors::none, |first| errors(*first, &report, &stretch.report));
+    let errors = own.first().map(|first| errors(*first, &report, &stretch.report)).unwrap_or_default();
     MeasuredScore {
         recording: stretch.recording.to_owned(),
         from_s: stretch.from_s,
@@ -74,7 +71,7 @@ fn channel_report(report: &Report, channel: Channel) -> Option<&ChannelReport> {
     report.channels.iter().find(|of| of.name == channel.name())
 }
 
-/// True if it was named, right names, parameters.
+/// True if the effect was named, then the right names, and the parameters.
 fn answer(
     kind: HiddenKind,
     effect: &HiddenEffect,
@@ -107,7 +104,7 @@ fn answer(
     }
 }
 
-/// True if none of `others` has the kind and parameters: one estimate within the other's interval.
+/// True if none of `others` has the same kind and parameters, that is one estimate within the other's interval.
 fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     let parameters = effect.parameters();
     let is_same = |other: &ChannelEffect| {
@@ -121,7 +118,7 @@ fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     !others.iter().any(is_same)
 }
 
-/// New names in the first report that are neither `right` in `own` channels nor of a part of the effect.
+/// New names of the first report that are neither `right` in `own` channels nor of a part of the effect.
 fn wrong_names(
     own: &[Channel],
     right: &[&str],
@@ -151,7 +148,7 @@ fn named_as(names: &BTreeSet<(Channel, &'static str)>) -> Vec<String> {
 
 fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErrors {
     let (Some(report), Some(untouched)) = (channel_report(report, channel), channel_report(untouched, channel)) else {
-        return MeasuredErrors::none();
+        return MeasuredErrors::default();
     };
     let raw = |model: &ModelReport| model.unseen.deviance_per_point;
     let excluding = |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
@@ -162,24 +159,5 @@ fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErro
         first_half_curve: report.first_half_curve.deviance_per_point,
         untouched_before: raw(&untouched.before),
         untouched_after: raw(&untouched.after),
-    }
-}
-
-impl MeasuredErrors {
-    const fn none() -> Self {
-        Self {
-            before: None,
-            after: None,
-            excluding: [None; 2],
-            first_half_curve: None,
-            untouched_before: None,
-            untouched_after: None,
-        }
-    }
-
-    /// True if the added terms fail and are worse than N, B and K as recorded.
-    #[must_use]
-    pub fn grew(&self) -> bool {
-        self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(FAILS))
     }
 }

@@ -1,4 +1,4 @@
-//! A part of a recording, and its effects.
+//! A part of a recording, and the effects hidden in it.
 
 use super::hidden_kind::HiddenKind;
 use super::hide::{HiddenEffect, has_samples_read_again, no_environment};
@@ -20,15 +20,15 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use virtual_sensor::{OutputRegister, SensorScenario};
 
-/// Least part of the required strength.
+/// Least acceptable fraction of the required strength.
 const LEAST_STRENGTH: f64 = 0.95;
-/// Factor on a size whose strength does not grow with it.
+/// Largest factor on a size whose strength does not grow with it.
 const LARGEST_SIZE: f64 = 10.0;
-/// Draws of a channel with noise above a count.
+/// Number of draws for a channel with noise above a count.
 const DRAWS: usize = 100;
-/// For unknown ranges, in deviations of a sample.
+/// Full scale for unknown ranges, in deviations of a sample.
 const UNKNOWN_FULL_SCALE: f64 = 1000.0;
-/// First kind of effect; `measured` and `hide` have others.
+/// Random stream of the first kind of effect; `measured` and `hide` have others.
 const DRAWN: u64 = 1;
 
 pub(super) struct Stretch<'a> {
@@ -41,9 +41,9 @@ pub(super) struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
-    /// At `strength`, with its own; `None` if no channel suits.
+    /// An effect of `kind` at `strength`, with the strength obtained; `None` if no channel is suitable.
     pub(super) fn draw(&self, kind: HiddenKind, strength: f64) -> Option<(HiddenEffect, f64)> {
-        // Own random numbers: a new kind changes no other.
+        // Each kind has its own random numbers, so a new kind changes no other.
         let of_kind = match kind {
             HiddenKind::Known(kind) => kind as u64,
             HiddenKind::Outside(kind) => EffectKind::ALL.len() as u64 + kind as u64,
@@ -54,12 +54,12 @@ impl Stretch<'_> {
         let channel = |random: &mut ChaCha8Rng| self.noise.channels.choose(random).copied();
         let first = *self.noise.channels.first()?;
         match kind {
-            // Its own losses and repetitions are unknown.
+            // The true losses and repetitions of the stretch are unknown.
             HiddenKind::Known(EffectKind::DroppedSamples) if self.samples.periods() > self.samples.len() as u64 => None,
             HiddenKind::Known(EffectKind::RepeatedSamples) if has_samples_read_again(&self.samples) => None,
             HiddenKind::Known(kind) => {
                 let of_channel = |random: &mut ChaCha8Rng| channel(random).unwrap_or(first);
-                // Drift beside a walk grows more slowly than its size.
+                // The strength of drift beside a walk grows more slowly than its size.
                 let ranges = [1.0, LARGEST_SIZE].map(|most| (strength, most * strength));
                 let mut drawn = ranges.into_iter().map(|range| {
                     draw_effects(&[kind], range, LEAST_STRENGTH * strength, &truth, of_channel, &mut random)
@@ -120,7 +120,8 @@ impl Stretch<'_> {
     }
 }
 
-/// True if the second missing code of `counts` is significant at `strength`: exp(−n) for n expected samples.
+/// True if the second missing code of `counts` is significant at `strength`; its probability is exp(−n) for n expected
+/// samples.
 fn are_seen_to_be_missing(counts: &[i32], effect: &OutsideEffect, strength: f64) -> bool {
     let mut samples: BTreeMap<i32, u32> = BTreeMap::new();
     counts.iter().for_each(|&code| *samples.entry(code).or_insert(0) += 1);
@@ -135,7 +136,8 @@ fn are_seen_to_be_missing(counts: &[i32], effect: &OutsideEffect, strength: f64)
 mod tests {
     use super::*;
 
-    /// Every fourth of a hundred codes; the second needs ½z² = 6.9 samples at strength 1, nine times as many at 3.
+    /// Every fourth of a hundred codes is missing. The second needs ½z² = 6.9 samples at strength 1, and nine times as
+    /// many at 3.
     #[test]
     fn missing_codes_are_hidden_where_two_of_them_have_samples() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -146,7 +148,7 @@ mod tests {
         for (samples, strength, expected) in [(6, 1.0, false), (7, 1.0, true), (62, 3.0, false), (63, 3.0, true)] {
             assert_eq!(are_seen_to_be_missing(&of_each(samples), &unit, strength), expected, "{samples}");
         }
-        // One is in reach.
+        // Only one missing code is within the range.
         let few: Vec<i32> = (0..10_000).map(|at| at % 3 - 1).collect();
         assert!(!are_seen_to_be_missing(&few, &unit, 1.0));
     }

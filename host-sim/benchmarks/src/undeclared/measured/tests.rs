@@ -1,4 +1,4 @@
-//! On generated noise in place of a recording.
+//! The measured-noise benchmark on generated noise instead of a recording.
 
 use super::hide::{HiddenEffect, has_samples_read_again, hide};
 use super::recording::part;
@@ -31,13 +31,13 @@ fn an_effect_of_size_0_changes_no_count_and_a_larger_one_its_channel_alone() {
     }
     let [before, after] = [&samples, &changed].map(|of| of.channels.iter().find(|of| of.profile.name == "gyro_y"));
     let (before, after) = (before.expect("gyro y"), after.expect("gyro y"));
-    // 0.5 °/s are 10 counts, ½·10² + 1/12; dithers double the 1/12.
+    // 0.5 °/s are 10 counts with a mean square of ½·10² + 1/12; the dithers double the 1/12.
     let squares = before.counts.iter().zip(&after.counts).map(|(a, b)| f64::from(b - a).powi(2));
     let mean = squares.sum::<f64>() / before.counts.len() as f64;
     assert!((mean - 50.0).abs() < 1.0, "{mean}");
 }
 
-/// Repeated samples stay so; chance equality of a quiet channel changes.
+/// Repeated samples stay repeated; in a quiet channel samples equal by chance change.
 #[test]
 fn samples_that_were_read_twice_stay_so() {
     let mut samples = recorded(20.0, 4).samples;
@@ -57,7 +57,7 @@ fn samples_that_were_read_twice_stay_so() {
     assert_eq!(repeated(&changed), samples.len() / 3);
     samples.channels.iter_mut().flat_map(|channel| &mut channel.counts).for_each(|count| *count = 0);
     let changed = gyro_y(&hide(&samples, &sinusoid(0.5), 7));
-    // Neighbours are equal near the turns.
+    // Neighbours are equal near the turns of the sinusoid.
     assert!(repeated(&changed) < samples.len() / 12, "{}", repeated(&changed));
 }
 
@@ -88,9 +88,6 @@ fn every_kind_is_hidden_in_every_stretch_or_counted() {
     assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::ALL.len());
     assert!(table.not_hidden.len() <= 3, "{:?}", table.not_hidden);
     assert!(table.scores.iter().all(|score| score.strength >= 0.95 * 3.0));
-    assert!(2 * table.named().yes >= table.named().all, "{:?}", table.named());
-    let mut text = Vec::new();
-    table.write(&mut text).expect("text");
-    let text = String::from_utf8(text).expect("text");
-    assert!(HiddenKind::ALL.iter().all(|kind| text.contains(kind.name())), "{text}");
+    let known = || table.scores.iter().filter(|score| matches!(score.kind, HiddenKind::Known(_)));
+    assert!(2 * known().filter(|score| score.named).count() >= known().count(), "{:?}", table.scores);
 }
