@@ -321,8 +321,7 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
         {
             let [one, other] =
                 [&self.arrays[first], array].map(|array| format!("array {:?} has {} rows", array.path(), array.rows));
-            let told = format!("{one}, {other}; columns of one table have as many rows");
-            return Err(fail(Reason::other(told)));
+            return Err(fail(Reason::UnequalRows(format!("{one}, {other}"))));
         }
         let wanted = WantedColumns { places: &places, rows: self.arrays[first].rows, budget: self.budget };
         Ok(Ending { damage: Stop::damage(self.reader.rows(&wanted, each))?, notes })

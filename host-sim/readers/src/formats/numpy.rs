@@ -41,17 +41,18 @@ impl NpyReader {
         Ok(ArraySource::new(file.name(), Self { input, layout, start }, arrays, budget))
     }
 
-    /// Rows from `first` on, of `columns` or whole.
-    fn fill(&mut self, first: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
+    /// Up to `rows` rows from `first` on, of `columns` or whole; as many as there are.
+    fn fill(&mut self, first: usize, rows: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
         let Self { layout, input, start } = self;
-        let rows = ROWS_AT_ONCE.min(layout.rows - first);
+        let mut whole = rows;
         for (buffer, column) in buffers.iter_mut().zip(columns) {
             let before = if layout.by_column { column * layout.rows + first } else { first };
             input.seek(SeekFrom::Start(*start + (before * layout.stride) as u64)).map_err(Reason::Io)?;
-            buffer.resize(rows * layout.stride, 0);
-            input.read_exact(buffer).map_err(|error| Reason::ended(FORMAT, error))?;
+            buffer.clear();
+            input.by_ref().take((rows * layout.stride) as u64).read_to_end(buffer).map_err(Reason::from_io)?;
+            whole = whole.min(buffer.len() / layout.stride);
         }
-        Ok(rows)
+        Ok(whole)
     }
 }
 
@@ -68,12 +69,16 @@ impl ArrayReader for NpyReader {
         let mut row = Vec::with_capacity(columns.len());
         let mut first = 0;
         while first < self.layout.rows {
-            let rows = self.fill(first, &columns, &mut buffers)?;
+            let expected = ROWS_AT_ONCE.min(self.layout.rows - first);
+            let rows = self.fill(first, expected, &columns, &mut buffers)?;
             for at in 0..rows {
                 let start = at * self.layout.stride;
                 row.clear();
                 row.extend(encoded.iter().map(|(buffer, encoded)| encoded.number(&buffers[*buffer][start..])));
                 each(&row)?;
+            }
+            if rows < expected {
+                return Err(Reason::Truncated { format: FORMAT }.into());
             }
             first += rows;
         }

@@ -61,6 +61,10 @@ pub enum Reason {
     NoNumbers,
     #[error("{0}")]
     Selection(Box<SelectionError>),
+    #[error("column {0}: no unit of the time; give one, as in --units us")]
+    NoTimeUnit(String),
+    #[error("{0}; columns of one table have as many rows")]
+    UnequalRows(String),
     #[error("there is nothing to read in this {format}")]
     NoTopic {
         /// Name of the format.

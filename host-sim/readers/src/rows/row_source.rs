@@ -306,8 +306,7 @@ impl Delivery<'_> {
                 let times: Vec<f64> =
                     self.waiting.iter().flat_map(|batch| &batch.times).copied().take(ROWS_OF_UNIT).collect();
                 let unit = usual_unit(&times, self.builder.first_time());
-                let none = || format!("column {}: no unit of the time; give one, as in --units us", self.time_label);
-                let unit = unit.ok_or_else(|| InputError::file(file, Reason::other(none())))?;
+                let unit = unit.ok_or_else(|| InputError::file(file, Reason::NoTimeUnit(self.time_label.clone())))?;
                 self.notes.push(format!("the column {} is taken to be in {}", self.time_label, unit.name));
                 self.time_unit_s = Some(unit.factor);
                 unit.factor
