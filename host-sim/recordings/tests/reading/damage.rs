@@ -88,7 +88,7 @@ fn a_recording_that_ends_early_is_read_up_to_there() {
     let mut frames = FrameLogWriter::new(&mut log);
     for at in 0..ROWS {
         let mut counts = NOT_RECORDED;
-        counts[..6].iter_mut().zip(3..).for_each(|(count, axis)| *count = (7919 * axis * at % 41) as i16);
+        counts[1..7].iter_mut().zip(3..).for_each(|(count, axis)| *count = (7919 * axis * at % 41) as i16);
         let miso = Burst::from_counts(&Counts::new(counts)).to_bytes().to_vec();
         let frame = Frame { time_s: at as f64 / 100.0, mosi: BURST_REQUEST.to_vec(), miso };
         frames.write(&frame).expect("memory");
