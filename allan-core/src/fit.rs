@@ -271,13 +271,6 @@ impl<'a> Baseline<'a> {
         self.deviance - self.tried.minimise(&self.points)
     }
 
-    /// [`fall`](Self::fall) with the `known` Allan variances of some terms at some averaging factors.
-    #[cfg(feature = "host")]
-    pub(crate) fn fall_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f32 {
-        self.tried.set_terms_with(&self.points, kinds, known);
-        self.deviance - self.tried.minimise(&self.points)
-    }
-
     /// Improvement by the terms `kinds` with their best coefficients and the best shapes of those that are `free`.
     #[inline(never)]
     pub(crate) fn improvement(

@@ -3,7 +3,7 @@
 use crate::cascade::Cascade;
 use crate::coupling::Coupling;
 use crate::curve::{AllanPoint, Curve, CurveView};
-use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
+use crate::fit::{FreeShapes, estimate, set_free_bounds};
 use crate::model::Model;
 use crate::term::{AllTerms, NoiseTerm};
 
@@ -81,28 +81,4 @@ pub fn fit_shapes_except<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm
     let free = FreeShapes::AllExcept(filter.map(core::slice::from_ref).unwrap_or_default());
     set_free_bounds(curve, &mut model, free);
     model
-}
-
-/// Compares sets of terms with fixed shapes by their deviance, at the degrees of freedom of one fitted model.
-pub struct DevianceComparison<'a>(Baseline<'a>);
-
-impl<'a> DevianceComparison<'a> {
-    /// A comparison for `curve`, with the degrees of freedom of `model`.
-    #[must_use]
-    pub fn new(curve: impl Into<CurveView<'a>>, model: &Model) -> Self {
-        let mut baseline = Baseline::empty(curve.into());
-        baseline.fill(model);
-        Self(baseline)
-    }
-
-    /// `Σ edf·(v/m − 1 − ln(v/m))` with the coefficients of `kinds` that make it least; infinite without terms.
-    pub fn deviance(&mut self, kinds: &[NoiseTerm]) -> f64 {
-        f64::from(self.0.deviance - self.0.fall(kinds))
-    }
-
-    /// [`deviance`](Self::deviance) with `known` Allan variances of some terms for a coefficient of 1 behind the
-    /// filter.
-    pub fn deviance_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f64 {
-        f64::from(self.0.deviance - self.0.fall_with(kinds, known))
-    }
 }

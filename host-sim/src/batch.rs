@@ -149,7 +149,7 @@ fn analysed(work: &Work, is_quick: bool, resume: bool, outputs: &OutputFiles) ->
         let analysed = read_or_ask(&work.recording, |recording| {
             report(recording, is_quick, &ReadMonitor::default(), &mut |_, _| {})
         })?;
-        let json = ReportJson::from(&analysed.report).with_reading(analysed.reading.as_ref());
+        let json = ReportJson::new(&analysed.report, analysed.reading.as_ref());
         output::write_json(&json, &work.report, outputs)?;
         Ok(Outcome::Reported(Box::new(analysed)))
     };

@@ -100,9 +100,9 @@ pub(crate) fn write_report(
     for target in &output.outputs {
         let OutputFile { format, file } = target;
         let result = match format {
-            OutputFormat::Json => write_json(&ReportJson::from(report).with_reading(reading.as_ref()), file, files),
+            OutputFormat::Json => write_json(&ReportJson::new(report, reading.as_ref()), file, files),
             OutputFormat::Page => {
-                let page = page::html_with_reading(report, source, reading.as_ref());
+                let page = page::html(report, source, reading.as_ref());
                 write_text(&page, file, files).map(|()| pages.push(file))
             }
             OutputFormat::Figures => figure::pictures(report)

@@ -12,7 +12,7 @@ use crate::model::{
     FittedTerm, FlickerCorrelations, MAX_TERMS, Model, degrees_of_freedom, filter_of, variance_fractions,
 };
 use crate::noise_type::VarianceFractions;
-use crate::term::{MovingAverageFilter, NoiseTerm, TermSet};
+use crate::term::{NoiseTerm, TermSet};
 use core::f32::consts::LN_2;
 use core::marker::PhantomData;
 use heapless::Vec;
@@ -138,11 +138,6 @@ impl<T: TermSet> Problem<T> {
     /// Sets the terms to the first [`MAX_TERMS`] of `kinds`; unchanged ones keep their columns.
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
     pub(super) fn set_terms(&mut self, points: &Points, kinds: &[NoiseTerm]) {
-        self.set_terms_by(points, kinds, &Self::set_column);
-    }
-
-    #[inline(always)]
-    fn set_terms_by(&mut self, points: &Points, kinds: &[NoiseTerm], set: &impl Fn(&mut Self, &Points, usize)) {
         let before = filter_of(&self.kinds);
         let mut is_known = [false; MAX_TERMS];
         let given = || kinds.iter().filter(|kind| T::contains(kind)).take(MAX_TERMS);
@@ -157,24 +152,9 @@ impl<T: TermSet> Problem<T> {
                 self.amounts[term] = 0.0;
             }
             if !is_known || (!is_same_filter && self.kinds[term].passes_filter()) {
-                set(self, points, term);
+                self.set_column(points, term);
             }
         }
-    }
-
-    /// [`set_terms`](Self::set_terms) with known Allan variances of some terms behind their filter.
-    #[cfg(feature = "host")]
-    pub(super) fn set_terms_with(
-        &mut self,
-        points: &Points,
-        kinds: &[NoiseTerm],
-        known: impl Fn(&NoiseTerm, u64) -> Option<f64>,
-    ) {
-        let period = points.curve.sample_period();
-        let avar = |kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64| {
-            known(kind, n).unwrap_or_else(|| T::avar(kind, filter, n, period))
-        };
-        self.set_terms_by(points, kinds, &|own, points, term| own.set_column_by(points, term, &avar));
     }
 
     /// Sets terms, coefficients and the points' confidence to those of a model.
@@ -236,20 +216,10 @@ impl<T: TermSet> Problem<T> {
     #[inline(never)]
     fn set_column(&mut self, points: &Points, term: usize) {
         let period = points.curve.sample_period();
-        self.set_column_by(points, term, &|kind, filter, n| T::avar(kind, filter, n, period));
-    }
-
-    #[inline(always)]
-    fn set_column_by(
-        &mut self,
-        points: &Points,
-        term: usize,
-        avar: &impl Fn(&NoiseTerm, Option<&MovingAverageFilter>, u64) -> f64,
-    ) {
         let (kind, filter) = (self.kinds[term], filter_of(&self.kinds));
         let mut largest = 0.0_f64;
         for (known, point) in (0..MAX_POINTS).zip(points.all()) {
-            let share = avar(&kind, filter.as_ref(), point.n) / point.avar;
+            let share = T::avar(&kind, filter.as_ref(), point.n, period) / point.avar;
             let column = &mut self.columns[term];
             if share > largest {
                 let shrink = (largest / share) as f32;

@@ -97,8 +97,8 @@ fn watch(stage: Stage) {
 fn files(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> Result<String> {
     let files = ReportFiles {
         title: reports::summary::headline(report, source).join(" · "),
-        html: page::html_with_reading(report, source, reading),
-        json: serde_json::to_string_pretty(&ReportJson::from(report).with_reading(reading))?,
+        html: page::html(report, source, reading),
+        json: serde_json::to_string_pretty(&ReportJson::new(report, reading))?,
     };
     Ok(serde_json::to_string(&files)?)
 }

@@ -1,7 +1,7 @@
 //! Estimates with their errors or bounds.
 
 use crate::distributions::NORMAL_975;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// An estimate with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,16 +46,22 @@ pub struct ChannelEstimate {
 
 /// An estimated number with its 95 % bounds, as a report lists it. A term that the data does not show has the value and the lower
 /// bound 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Estimate.
     pub value: f64,
     /// Lower 95 % bound.
     pub low: f64,
-    /// Upper 95 % bound.
+    /// Upper 95 % bound; infinite if unknown.
+    #[serde(deserialize_with = "unbounded")]
     pub high: f64,
     /// Unit of all three.
     pub unit: String,
+}
+
+/// JSON has `null` for infinity.
+pub(crate) fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
 impl BoundedEstimate {
@@ -89,6 +95,11 @@ impl BoundedEstimate {
         Self::new(1.0 / self.value, 1.0 / self.high, 1.0 / self.low)
     }
 
+    /// The standard deviation of a normal distribution with these bounds.
+    pub(crate) fn error(self) -> f64 {
+        (self.high - self.low) / (2.0 * NORMAL_975)
+    }
+
     /// All three times `factor`, which is positive.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
@@ -101,6 +112,11 @@ impl ChannelEstimate {
     #[must_use]
     pub const fn estimate(self) -> BoundedEstimate {
         BoundedEstimate::new(self.value, self.low, self.high)
+    }
+
+    /// The standard deviation of a normal distribution with these bounds.
+    pub(crate) fn error(self) -> f64 {
+        self.estimate().error()
     }
 
     /// As a parameter in the unit of the channel.
@@ -129,7 +145,8 @@ impl Parameter {
     }
 
     /// Without the unit.
-    pub(crate) const fn estimate(&self) -> BoundedEstimate {
+    #[must_use]
+    pub const fn estimate(&self) -> BoundedEstimate {
         BoundedEstimate::new(self.value, self.low, self.high)
     }
 }

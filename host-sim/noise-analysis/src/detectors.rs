@@ -32,7 +32,7 @@ pub(crate) mod random_telegraph;
 pub(crate) mod spikes;
 pub(crate) mod stuck_output;
 mod telegraph_models;
-mod thermal_response;
+pub(crate) mod thermal_response;
 mod time_constant;
 mod turn_on;
 pub(crate) mod vibration_rectification;

@@ -12,6 +12,7 @@ pub mod figure_data;
 pub(crate) mod part_report;
 pub mod several;
 
+use crate::bounds::unbounded;
 pub use crate::bounds::{BoundedEstimate, Parameter};
 pub use crate::effects::Effect;
 pub use crate::effects::findings::{ChannelEffect, Finding, Validation};
@@ -33,12 +34,13 @@ use std::collections::BTreeMap;
 /// Version of the JSON schema; the field names are fixed within a version.
 pub const SCHEMA: u32 = 2;
 
-/// A whole analysis.
-#[derive(Debug, Clone, PartialEq)]
+/// A whole analysis. Its JSON is without the findings, which the crate of the reports adds with each channel's numbers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     pub schema: u32,
     /// Whether the report is of the curves alone, without what needs the samples themselves: spectra, spikes, steps, covariates,
     /// causes that channels have in common, and changes of the noise. Absent where it is not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub quick: bool,
     /// As the user states it or as the time stamps show it, Hz.
     pub sample_rate_hz: f64,
@@ -51,11 +53,14 @@ pub struct Report {
     /// What the sensor has once for all its channels.
     pub part: PartReport,
     /// What the baseline models lack, one entry a cause.
+    #[serde(skip)]
     pub findings: Vec<Finding>,
     /// Regression of the gyros and accelerometers on each other; absent where there are fewer than two, or too few samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub common_mode: Option<CommonModeRegression>,
     /// The longest part at rest by the rows of its file, s from the first of them, where the platform moved and the file was looked at.
     /// Not in the JSON, which says nothing of the file; `None` leaves it to [`ChannelReport::at_rest`].
+    #[serde(skip)]
     pub longest_at_rest: Option<Stretch>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
@@ -108,7 +113,7 @@ pub enum PartNote {
         /// The sample rate that is stated, Hz.
         stated_hz: f64,
     },
-    /// The curves give the length of the filter; the taps follow from the nominal clock.
+    /// The spectra give the length of the filter; the taps follow from the nominal clock.
     LengthAlone {
         /// Length of the filter in samples of the record.
         length: f64,
@@ -133,7 +138,7 @@ pub struct Stretch {
 }
 
 /// One output of the sensor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelReport {
     /// The channel's name, such as `gyro_z`.
     pub name: String,
@@ -142,6 +147,7 @@ pub struct ChannelReport {
     /// Samples that arrived and were used as a whole, in every channel.
     pub samples: u64,
     /// Samples that the channel's model lacks.
+    #[serde(flatten)]
     pub missing: MissingSamples,
     /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
@@ -161,15 +167,19 @@ pub struct ChannelReport {
     pub first_half_curve: ModelErrorReport,
     /// The model of `after`, fitted once more to the whole record. Its errors are those of `after`: the whole record leaves no
     /// data that it has not seen.
+    #[serde(rename = "final")]
     pub refitted: ModelReport,
     /// How the noise changes in the course of the record; absent of a record that is too short to be cut into epochs, and of
     /// channels other than gyros and accelerometers.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub nonstationarity: Option<Nonstationarity>,
     /// Stretches in which the sensor was at rest: those without a motion of any channel.
     pub at_rest: Vec<Stretch>,
     /// Assessment of the model for use in navigation.
+    #[serde(rename = "practice")]
     pub assessment: Assessment,
     /// What the figures show beside the Allan deviation.
+    #[serde(flatten)]
     pub figure_data: FigureData,
 }
 
@@ -186,7 +196,7 @@ pub struct MissingSamples {
 }
 
 /// One octave of the measured Allan deviation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// Averaging factor, samples.
     pub n: u64,
@@ -194,19 +204,24 @@ pub struct CurvePoint {
     /// Allan deviation in the channel's unit.
     pub adev: f64,
     pub low: f64,
+    /// Infinite if unknown.
+    #[serde(deserialize_with = "unbounded")]
     pub high: f64,
     /// Equivalent degrees of freedom.
     pub edf: f64,
     /// Share of the samples that were missing and replaced from their neighbours, %. 0 where the differences over gaps are
     /// left out.
+    #[serde(default)]
     pub replaced_percent: f64,
     /// `100/sqrt(2(N/n−1))`: the percentage accuracy of a point in the slope method, for `N` samples.
+    #[serde(default)]
     pub accuracy_percent: f64,
     /// Allan deviation by equation (5) from the measured spectrum, in the channel's unit; absent at averaging times of more
     /// than a sixteenth of the record, which the spectrum does not resolve.
     pub adev_by_spectrum: Option<f64>,
     /// Allan deviation of rounding errors that are correlated, a part of `adev` and of that of the models; 0 where they are white, and
     /// so a part of N.
+    #[serde(default)]
     pub rounding: f64,
 }
 

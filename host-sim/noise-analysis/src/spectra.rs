@@ -20,6 +20,7 @@
 //! ```
 
 mod alternation;
+pub(crate) mod block_cosines;
 mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
@@ -50,6 +51,7 @@ mod whitened_spectrum;
 mod whittle;
 
 pub use equation_5::allan_deviations_by_spectrum;
+pub(crate) use harmonics::nearest_multiple;
 pub use line_envelope::Modulation;
 pub use lines::find_lines;
 pub(crate) use lines::{find_lines_over, without_sines, without_slow_sines};

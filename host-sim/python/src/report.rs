@@ -52,8 +52,7 @@ impl NativeReport {
     /// The report as JSON.
     fn json(&self, py: Python) -> PyResult<String> {
         let Analysed { report, reading } = &self.analysed;
-        py.detach(|| serde_json::to_string_pretty(&ReportJson::from(report).with_reading(reading.as_ref())))
-            .map_err(failed)
+        py.detach(|| serde_json::to_string_pretty(&ReportJson::new(report, reading.as_ref()))).map_err(failed)
     }
 
     /// The screen of the command, without colours.
@@ -69,7 +68,7 @@ impl NativeReport {
     /// The page, or only its first screen.
     fn page(&self, py: Python, is_whole: bool) -> String {
         let Analysed { report, reading } = &self.analysed;
-        let make = if is_whole { page::html_with_reading } else { page::first_screen };
+        let make = if is_whole { page::html } else { page::first_screen };
         py.detach(|| make(report, Some(&self.name), reading.as_ref()))
     }
 

@@ -8,15 +8,15 @@ use noise_analysis::report::{ChannelReport, Report};
 /// Empty if the coefficients are as a reader expects.
 #[must_use]
 pub fn coefficient_notes(report: &Report) -> Vec<String> {
-    let named = |is_one: &dyn Fn(&ChannelReport) -> bool| -> Vec<String> {
-        report.channels.iter().filter(|channel| is_one(channel)).map(|channel| channel.name.clone()).collect()
+    let named = |is_one: &dyn Fn(&ChannelReport) -> bool| {
+        let names: Vec<&String> = report.channels.iter().filter(|of| is_one(of)).map(|of| &of.name).collect();
+        (!names.is_empty()).then(|| channel_list(names))
     };
     let by_curve = named(&|channel| channel.assessment.coefficients_from == CoefficientsFrom::OctavesAgainstSamples);
-    let by_curve = (!by_curve.is_empty()).then(|| {
+    let by_curve = by_curve.map(|names| {
         format!(
-            "N, B and K of {} are those that the Allan deviation shows; a navigation filter takes these. A fit to all samples does not \
-             describe it: the record has more than the model, such as noise that changes, a line that wanders or another filter.",
-            channel_list(&by_curve)
+            "N, B and K of {names} are those that the Allan deviation shows; a navigation filter takes these. A fit to all samples does not \
+             describe it: the record has more than the model, such as noise that changes, a line that wanders or another filter."
         )
     });
     let share = |channel: &ChannelReport| {
@@ -25,11 +25,10 @@ pub fn coefficient_notes(report: &Report) -> Vec<String> {
     };
     let rounded = named(&|channel| share(channel) > 0.0);
     let largest = report.channels.iter().map(share).fold(0.0, f64::max);
-    let rounded = (!rounded.is_empty()).then(|| {
+    let rounded = rounded.map(|names| {
         format!(
-            "Samples of {} change by less than a count from one to the next, so that their rounding errors are correlated: up to {} % of \
+            "Samples of {names} change by less than a count from one to the next, so that their rounding errors are correlated: up to {} % of \
              the measured variance at short averaging times. The models have this share apart from N, B and K.",
-            channel_list(&rounded),
             significant(100.0 * largest, 2)
         )
     });

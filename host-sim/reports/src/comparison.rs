@@ -1,15 +1,15 @@
 //! Two reports, or a report and the data sheet, compared coefficient by coefficient.
 
-use crate::formatting::number;
+use crate::coefficients::KINDS;
+use crate::formatting::{number, plain_table};
 use crate::rounding::{probability, significant};
-use crate::saved_report::{SavedChannel, SavedPoint, SavedReport};
+use crate::saved_report::{SavedChannel, SavedReport};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::comparison::{Verdict, verdicts};
+use noise_analysis::report::{CurvePoint, Parameter};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Coefficients that are compared, by their names in a report.
-const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
 /// Channels of the conditions: they differ between records of any sensor, and rounded temperatures have no white noise.
 const CONDITIONS: [&str; 2] = ["temp", "supply"];
 /// The lowest point of the measured Allan deviation, which data sheets call in-run bias stability.
@@ -34,41 +34,26 @@ pub enum ComparisonError {
     NoDataSheet,
 }
 
-/// A comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     pub coefficients: Vec<ComparedCoefficient>,
 }
 
-/// One coefficient in both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedCoefficient {
     pub channel: String,
     pub kind: String,
     pub unit: String,
-    pub first: Bounded,
-    pub second: Bounded,
+    pub first: BoundedEstimate,
+    pub second: BoundedEstimate,
     /// Sign of the difference, if significant.
     pub verdict: Verdict,
     /// Probability that estimates of one truth differ as much.
     pub p_value: f64,
 }
 
-/// An estimate with its 95 % bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Bounded {
-    pub value: f64,
-    pub low: f64,
-    pub high: f64,
-}
-
-impl From<BoundedEstimate> for Bounded {
-    fn from(BoundedEstimate { value, low, high }: BoundedEstimate) -> Self {
-        Self { value, low, high }
-    }
-}
-
-type Pair = (String, &'static str, String, BoundedEstimate, BoundedEstimate);
+/// Channel, kind, both estimates.
+type Pair<'a> = (&'a SavedChannel, &'static str, Parameter, Parameter);
 
 /// Compares the final models of two reports, without temperature and supply.
 ///
@@ -86,9 +71,7 @@ pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Compariso
             });
         }
         for kind in KINDS {
-            if let (Some((a, unit)), Some((b, _))) = (coefficient(one, kind), coefficient(other, kind)) {
-                pairs.push((one.name.clone(), kind, unit, a, b));
-            }
+            pairs.extend(one.coefficient(kind).zip(other.coefficient(kind)).map(|(a, b)| (one, kind, a, b)));
         }
     }
     compared(pairs)
@@ -99,7 +82,6 @@ pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Compariso
 /// # Errors
 /// The report has no values of a data sheet, or they say nothing of what was measured.
 pub fn with_data_sheet(report: &SavedReport) -> Result<Comparison, ComparisonError> {
-    let exact = |value: f64| BoundedEstimate { value, low: value, high: value };
     let specified = || report.channels.iter().filter_map(|channel| Some((channel.data_sheet.as_ref()?, channel)));
     if specified().next().is_none() {
         return Err(ComparisonError::NoDataSheet);
@@ -107,52 +89,46 @@ pub fn with_data_sheet(report: &SavedReport) -> Result<Comparison, ComparisonErr
     let mut pairs = Vec::new();
     for (specified, channel) in specified() {
         for (kind, value) in [(KINDS[0], specified.angle_random_walk), (KINDS[2], specified.rate_random_walk)] {
-            if let (Some(value), Some((measured, unit))) = (value, coefficient(channel, kind)) {
-                pairs.push((channel.name.clone(), kind, unit, exact(value), measured));
-            }
+            pairs.extend(value.zip(channel.coefficient(kind)).map(|(value, of)| exact(channel, kind, value, of)));
         }
-        if let (Some(value), Some(lowest)) = (specified.in_run_bias_stability, lowest(channel)) {
-            pairs.push((channel.name.clone(), LOWEST, channel.unit.clone(), exact(value), lowest));
-        }
+        let lowest = specified.in_run_bias_stability.zip(lowest(channel));
+        pairs.extend(lowest.map(|(value, of)| exact(channel, LOWEST, value, of)));
     }
     compared(pairs)
 }
 
-fn coefficient(channel: &SavedChannel, kind: &str) -> Option<(BoundedEstimate, String)> {
-    let of = channel.coefficient(kind)?;
-    Some((BoundedEstimate { value: of.value, low: of.low, high: of.high }, of.unit))
+/// A data sheet's value beside what was measured.
+fn exact<'a>(channel: &'a SavedChannel, kind: &'static str, value: f64, measured: Parameter) -> Pair<'a> {
+    (channel, kind, BoundedEstimate::exact(value).parameter(measured.unit.clone()), measured)
 }
 
-fn lowest(channel: &SavedChannel) -> Option<BoundedEstimate> {
+fn lowest(channel: &SavedChannel) -> Option<Parameter> {
     let positive = channel.curve.iter().filter(|point| point.adev > 0.0);
-    let SavedPoint { adev, low, high, .. } = positive.min_by(|a, b| a.adev.total_cmp(&b.adev))?;
-    Some(BoundedEstimate { value: *adev, low: *low, high: *high })
+    let CurvePoint { adev, low, high, .. } = positive.min_by(|a, b| a.adev.total_cmp(&b.adev))?;
+    Some(Parameter::new(*adev, *low, *high, channel.unit.clone()))
 }
 
-fn compared(pairs: Vec<Pair>) -> Result<Comparison, ComparisonError> {
+fn compared(pairs: Vec<Pair<'_>>) -> Result<Comparison, ComparisonError> {
     if pairs.is_empty() {
         return Err(ComparisonError::Nothing);
     }
-    let estimates: Vec<(BoundedEstimate, BoundedEstimate)> = pairs.iter().map(|(.., a, b)| (*a, *b)).collect();
-    let row =
-        |((channel, kind, unit, first, second), (verdict, p_value)): (Pair, (Verdict, f64))| ComparedCoefficient {
-            channel,
-            kind: kind.to_owned(),
-            unit,
-            first: first.into(),
-            second: second.into(),
-            verdict,
-            p_value,
-        };
+    let estimates: Vec<_> = pairs.iter().map(|(.., first, second)| (first.estimate(), second.estimate())).collect();
+    let row = |((channel, kind, first, second), (verdict, p_value)): (Pair<'_>, (Verdict, f64))| ComparedCoefficient {
+        channel: channel.name.clone(),
+        kind: kind.to_owned(),
+        first: first.estimate(),
+        second: second.estimate(),
+        unit: first.unit,
+        verdict,
+        p_value,
+    };
     Ok(Comparison { coefficients: pairs.into_iter().zip(verdicts(&estimates)).map(row).collect() })
 }
 
 impl Comparison {
     /// Writes a table, whose columns of values are headed `first` and `second`.
     pub fn write(&self, first: &str, second: &str, out: &mut impl Write) -> io::Result<()> {
-        let mut table = comfy_table::Table::new();
-        table.load_preset(comfy_table::presets::NOTHING);
-        table.set_header(["channel", "coefficient", first, second, "unit", "ratio", second, "p"]);
+        let mut table = plain_table(["channel", "coefficient", first, second, "unit", "ratio", second, "p"]);
         for row in &self.coefficients {
             let verdict = match row.verdict {
                 Verdict::Better => "better",
@@ -174,7 +150,7 @@ impl Comparison {
     }
 }
 
-fn bounded(Bounded { value, low, high }: Bounded) -> String {
+fn bounded(BoundedEstimate { value, low, high }: BoundedEstimate) -> String {
     if low == value && high == value {
         number(value)
     } else {

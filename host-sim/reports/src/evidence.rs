@@ -9,38 +9,20 @@ use noise_analysis::effects::{
 };
 use noise_analysis::report::Finding;
 
-/// A sentence on the evidence, in two parts.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct EvidenceText {
-    pub measured: String,
-    /// The rest with the sign between; may be empty.
-    pub rest: String,
+/// A sentence on the evidence of an effect: measured value, threshold, usual causes.
+pub(crate) fn of_effect(effect: &Effect) -> String {
+    displayed(of_kind(effect))
 }
 
-impl EvidenceText {
-    pub(crate) fn of_effect(effect: &Effect) -> Self {
-        let Self { measured, rest } = of_kind(effect);
-        Self { measured: displayed(&measured), rest: displayed(&rest) }
-    }
-
-    pub(crate) fn of_finding(finding: &Finding) -> Self {
-        let Self { measured, rest } = Self::of_effect(&finding.effect);
-        match finding.channels.len() {
-            0 | 1 => Self { measured, rest },
-            count => Self {
-                measured: displayed(&format!("{}: {measured}", finding.channels[finding.clearest])),
-                rest: format!("{rest}; one cause in {count} channels"),
-            },
+/// That of the channel that shows a finding most clearly.
+pub(crate) fn of_finding(finding: &Finding) -> String {
+    let evidence = of_kind(&finding.effect);
+    match finding.channels.len() {
+        0 | 1 => displayed(evidence),
+        count => {
+            displayed(format!("{}: {evidence}; one cause in {count} channels", finding.channels[finding.clearest]))
         }
     }
-
-    pub(crate) fn sentence(&self) -> String {
-        format!("{}{}", self.measured, self.rest)
-    }
-}
-
-fn text(measured: String, rest: impl Into<String>) -> EvidenceText {
-    EvidenceText { measured, rest: rest.into() }
 }
 
 /// A time in s with three decimals, below 0.1 s with four.
@@ -53,9 +35,9 @@ fn excess(curve: &CurveEvidence) -> String {
 }
 
 /// A term that was added, with its usual cause.
-fn added(curve: &CurveEvidence, meaning: &str) -> EvidenceText {
+fn added(curve: &CurveEvidence, meaning: &str) -> String {
     let gain = curve.gain_sigmas;
-    text(excess(curve), format!(" before it was added, which takes {gain:.0} σ off the fit; {meaning}"))
+    format!("{} before it was added, which takes {gain:.0} σ off the fit; {meaning}", excess(curve))
 }
 
 fn counted(count: u64, one: &str) -> String {
@@ -80,8 +62,8 @@ fn likelier(gain: f64) -> String {
     if gain > MILLION.ln() { "more than a million".to_owned() } else { significant(gain.exp(), 2) }
 }
 
-fn displayed(text: &str) -> String {
-    let text = text.strip_prefix('-').map_or_else(|| text.to_owned(), |number| format!("−{number}"));
+fn displayed(text: String) -> String {
+    let text = text.strip_prefix('-').map_or_else(|| text.clone(), |number| format!("−{number}"));
     DISPLAYED.iter().fold(text, |text, (name, shown)| text.replace(name, shown))
 }
 
@@ -89,16 +71,14 @@ fn amount(value: f64, unit: &str) -> String {
     quantity_digits(value, unit, 3)
 }
 
-fn of_kind(effect: &Effect) -> EvidenceText {
+fn of_kind(effect: &Effect) -> String {
     match effect {
         Effect::OutputFilter(of) => added(&of.evidence, &filter_meaning(of)),
         Effect::LowPassFilter(of) => match of.design {
-            LowPassDesign::OneStage { time_constant_s } => text(
+            LowPassDesign::OneStage { time_constant_s } => format!(
+                "{}; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
                 excess(&of.evidence),
-                format!(
-                    "; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
-                    seconds(time_constant_s)
-                ),
+                seconds(time_constant_s)
             ),
             LowPassDesign::TwoStages => {
                 added(&of.evidence, "neighbours correlate as behind two equal low-pass stages of the first order")
@@ -110,308 +90,236 @@ fn of_kind(effect: &Effect) -> EvidenceText {
         Effect::SinusoidalLine(of) => harmonic(of.multiples.as_ref(), &of.evidence),
         Effect::ResonantLine(of) => harmonic(of.multiples.as_ref(), &of.evidence),
         Effect::ModulatedLine(of) => modulated(of),
-        Effect::Chirp(of) => text(
-            format!(
-                "a line whose frequency runs from {:.2} to {:.2} Hz over the record, {:+.0} % of the noise of short spectra, by \
-                 chance anywhere {}",
-                of.start_hz.value,
-                of.end_hz.value,
-                100.0 * of.excess,
-                chance(of.p_value)
-            ),
-            "; a speed that changes",
+        Effect::Chirp(of) => format!(
+            "a line whose frequency runs from {:.2} to {:.2} Hz over the record, {:+.0} % of the noise of short spectra, by chance \
+             anywhere {}; a speed that changes",
+            of.start_hz.value,
+            of.end_hz.value,
+            100.0 * of.excess,
+            chance(of.p_value)
         ),
-        Effect::Periodic(of) => text(
-            format!(
-                "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, \
-                 {:.0} times the noise, by chance at any period {}",
-                1.0 / of.frequency_hz.value,
-                of.harmonics_percent.value,
-                of.sum,
-                chance(of.p_value)
-            ),
-            "; something that is switched by a clock or a thermostat",
+        Effect::Periodic(of) => format!(
+            "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, {:.0} times the \
+             noise, by chance at any period {}; something that is switched by a clock or a thermostat",
+            1.0 / of.frequency_hz.value,
+            of.harmonics_percent.value,
+            of.sum,
+            chance(of.p_value)
         ),
-        Effect::SquareWave(of) => text(
-            format!(
-                "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic",
-                harmonics(&of.multiples),
-                of.frequency_hz.value
-            ),
-            format!("; {}", of_line(&of.line).sentence()),
+        Effect::SquareWave(of) => format!(
+            "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic; {}",
+            harmonics(&of.multiples),
+            of.frequency_hz.value,
+            of_line(&of.line)
         ),
-        Effect::ShotNoise(of) => text(
-            format!(
-                "the third moment behind a filter for disturbances {} that decay within {:.2} s is {:.1} standard deviations from \
-                 that of a Gaussian process, by chance {}, and {:.1} behind the same filter in reversed time",
-                if of.sum > 0.0 { "upwards" } else { "downwards" },
-                of.time_constant_s.value,
-                of.sum.abs(),
-                chance(of.p_value),
-                of.reversed.abs()
-            ),
-            "; shocks, or a load that comes on at random times",
+        Effect::ShotNoise(of) => format!(
+            "the third moment behind a filter for disturbances {} that decay within {:.2} s is {:.1} standard deviations from that of \
+             a Gaussian process, by chance {}, and {:.1} behind the same filter in reversed time; shocks, or a load that comes on at \
+             random times",
+            if of.sum > 0.0 { "upwards" } else { "downwards" },
+            of.time_constant_s.value,
+            of.sum.abs(),
+            chance(of.p_value),
+            of.reversed.abs()
         ),
         Effect::TelegraphNoise(of) => match &of.evidence {
-            TelegraphEvidence::Kurtosis { ratio, error, curve } => text(
-                format!(
-                    "two levels: excess kurtosis {ratio:.2} ± {error:.2} of that of a telegraph signal, a Gaussian process has 0"
-                ),
-                format!("; {}", added(curve, CORRELATED).sentence()),
+            TelegraphEvidence::Kurtosis { ratio, error, curve } => format!(
+                "two levels: excess kurtosis {ratio:.2} ± {error:.2} of that of a telegraph signal, a Gaussian process has 0; {}",
+                added(curve, CORRELATED)
             ),
-            TelegraphEvidence::Levels { jumps, gain } => text(
-                format!(
-                    "two levels {} apart with {jumps:.0} jumps between them, {} times as likely as a Gaussian process of any \
-                     correlation time",
-                    amount(of.amplitude.value, of.amplitude.unit),
-                    likelier(*gain)
-                ),
-                "; charges that are caught and let go in a transistor or a crystal",
+            TelegraphEvidence::Levels { jumps, gain } => format!(
+                "two levels {} apart with {jumps:.0} jumps between them, {} times as likely as a Gaussian process of any correlation \
+                 time; charges that are caught and let go in a transistor or a crystal",
+                amount(of.amplitude.value, of.amplitude.unit),
+                likelier(*gain)
             ),
         },
         Effect::MarkovProcess(of) => match &of.evidence {
             MarkovEvidence::Curve(curve) => added(curve, CORRELATED),
-            MarkovEvidence::Spectrum { corner_hz, gain } => text(
-                format!(
-                    "the spectrum is flat below {} Hz, where a random walk would rise: {} times as likely",
-                    seconds(*corner_hz),
-                    likelier(*gain)
-                ),
-                format!("; {CORRELATED}"),
+            MarkovEvidence::Spectrum { corner_hz, gain } => format!(
+                "the spectrum is flat below {} Hz, where a random walk would rise: {} times as likely; {CORRELATED}",
+                seconds(*corner_hz),
+                likelier(*gain)
             ),
         },
-        Effect::CommonMode(of) => text(
-            format!(
-                "moves with {}: their spectra are {} times as likely as those of channels with nothing in common, and no \
-                 measured cause explains it",
-                of.others.join(" and "),
-                likelier(of.gain)
-            ),
-            "; a shared reference, supply or temperature gradient",
+        Effect::CommonMode(of) => format!(
+            "moves with {}: their spectra are {} times as likely as those of channels with nothing in common, and no measured cause \
+             explains it; a shared reference, supply or temperature gradient",
+            of.others.join(" and "),
+            likelier(of.gain)
         ),
-        Effect::SharedDrift(of) => text(
-            format!(
-                "moves with {} at {}, {:.0} σ, which is more than {:.0} times the data sheet's sensitivity: both share a \
-                 drift whose cause was not measured",
-                of.with,
-                amount(of.ratio.value, &format!("{}/{}", of.ratio.unit, of.per)),
-                of.sigmas,
-                of.largest_multiple
-            ),
-            "",
+        Effect::SharedDrift(of) => format!(
+            "moves with {} at {}, {:.0} σ, which is more than {:.0} times the data sheet's sensitivity: both share a drift whose \
+             cause was not measured",
+            of.with,
+            amount(of.ratio.value, &format!("{}/{}", of.ratio.unit, of.per)),
+            of.sigmas,
+            of.largest_multiple
         ),
         Effect::LinearDrift(of) => match &of.evidence {
             LinearDriftEvidence::Curve(curve) => added(curve, "a steady drift: warming up, or ageing"),
-            LinearDriftEvidence::Regression { p_value } => text(
-                format!(
-                    "the level moves by {} throughout, by chance {} in white, flicker and walking noise of any mixture",
-                    amount(of.slope.value, &of.slope_parameter().unit),
-                    chance(*p_value)
-                ),
-                "; warm-up that no sensor shows, or aging",
+            LinearDriftEvidence::Regression { p_value } => format!(
+                "the level moves by {} throughout, by chance {} in white, flicker and walking noise of any mixture; warm-up that no \
+                 sensor shows, or aging",
+                amount(of.slope.value, &of.slope_parameter().unit),
+                chance(*p_value)
             ),
         },
-        Effect::LevelStep(of) => text(
-            format!(
-                "the level changes by {} at {:.1} s and stays, by chance anywhere {} in white, flicker and walking noise of any \
-                 mixture",
-                amount(of.size.value, of.size.unit),
-                of.time_s.value,
-                chance(of.p_value)
-            ),
-            "; a mechanical or thermal shock, or a fault that begins",
+        Effect::LevelStep(of) => format!(
+            "the level changes by {} at {:.1} s and stays, by chance anywhere {} in white, flicker and walking noise of any mixture; \
+             a mechanical or thermal shock, or a fault that begins",
+            amount(of.size.value, of.size.unit),
+            of.time_s.value,
+            chance(of.p_value)
         ),
-        Effect::LevelChange(of) => text(
-            format!(
-                "the deviation of neighbours' differences changes by the factor {:.3} at {:.1} s and stays, which explains {:.0} % of \
-                 the changes of its level, by chance anywhere {}",
-                of.ratio.value,
-                of.time_s.value,
-                100.0 * of.explained,
-                chance(of.p_value)
-            ),
-            "; a machine that is switched on, or a setting of the sensor",
+        Effect::LevelChange(of) => format!(
+            "the deviation of neighbours' differences changes by the factor {:.3} at {:.1} s and stays, which explains {:.0} % of the \
+             changes of its level, by chance anywhere {}; a machine that is switched on, or a setting of the sensor",
+            of.ratio.value,
+            of.time_s.value,
+            100.0 * of.explained,
+            chance(of.p_value)
         ),
-        Effect::TemperatureSensitivity(of) => text(
-            format!("follows the measured temperature, {:.0} σ", of.sigmas),
-            "; a bias that drifts with temperature",
+        Effect::TemperatureSensitivity(of) => {
+            format!("follows the measured temperature, {:.0} σ; a bias that drifts with temperature", of.sigmas)
+        }
+        Effect::TemperatureCurvature(of) => format!(
+            "follows the square of the measured temperature, by chance {} in white, flicker and walking noise of any mixture; a \
+             sensitivity that itself changes with temperature",
+            chance(of.p_value)
         ),
-        Effect::TemperatureCurvature(of) => text(
-            format!(
-                "follows the square of the measured temperature, by chance {} in white, flicker and walking noise of any mixture",
-                chance(of.p_value)
-            ),
-            "; a sensitivity that itself changes with temperature",
+        Effect::TurnOnTransient(of) => format!(
+            "the means decay exponentially from the first sample on, with a time constant of {:.0} s, by chance {} in white, flicker \
+             and walking noise of any mixture; a part that warms itself after it was turned on",
+            of.time_constant_s.value,
+            chance(of.p_value)
         ),
-        Effect::TurnOnTransient(of) => text(
-            format!(
-                "the means decay exponentially from the first sample on, with a time constant of {:.0} s, by chance {} in white, flicker and walking \
-                 noise of any mixture",
-                of.time_constant_s.value,
-                chance(of.p_value)
-            ),
-            "; a part that warms itself after it was turned on",
-        ),
-        Effect::ThermalLag(of) => text(
-            format!(
-                "follows the measured temperature behind a lag of {:.0} s, by chance {}, and better than without a lag",
-                of.time_constant_s.value,
-                chance(of.p_value)
-            ),
-            "; the sensing element warms up later than the thermometer",
+        Effect::ThermalLag(of) => format!(
+            "follows the measured temperature behind a lag of {:.0} s, by chance {}, and better than without a lag; the sensing \
+             element warms up later than the thermometer",
+            of.time_constant_s.value,
+            chance(of.p_value)
         ),
         Effect::SupplySensitivity(of) => {
-            text(format!("follows the measured supply, {:.0} σ", of.sigmas), "; a bias that is not regulated")
+            format!("follows the measured supply, {:.0} σ; a bias that is not regulated", of.sigmas)
         }
         Effect::AccelerationSensitivity(of) => {
-            text(format!("follows the measured specific force, {:.0} σ", of.sigmas), "; g-sensitivity of the gyro")
+            format!("follows the measured specific force, {:.0} σ; g-sensitivity of the gyro", of.sigmas)
         }
-        Effect::VibrationRectification(of) => text(
-            format!(
-                "follows the variance of {}, whose vibration reaches {} rms, by chance {} in white, flicker and walking noise of \
-                 any mixture",
-                of.accelerometer,
-                amount(of.strongest, of.per),
-                chance(of.p_value)
-            ),
-            "",
+        Effect::VibrationRectification(of) => format!(
+            "follows the variance of {}, whose vibration reaches {} rms, by chance {} in white, flicker and walking noise of any \
+             mixture",
+            of.accelerometer,
+            amount(of.strongest, of.per),
+            chance(of.p_value)
         ),
         Effect::AngleQuantization(of) => {
             added(&of.evidence, "steps of the angle: a counter or an integrator before the output")
         }
-        Effect::EffectiveLsb(of) => text(
-            format!(
-                "all {} values lie {} counts or a multiple of that apart, {} changes without an exception",
-                of.values, of.counts, of.changes
-            ),
-            "; a converter of fewer bits, or rounding on the way",
+        Effect::EffectiveLsb(of) => format!(
+            "all {} values lie {} counts or a multiple of that apart, {} changes without an exception; a converter of fewer bits, or \
+             rounding on the way",
+            of.values, of.counts, of.changes
         ),
         Effect::NoiseBelowCount(of) if of.deviation.value == 0.0 => {
-            text("the value never changes".to_owned(), "; nothing is known of its noise but that it is below a count")
+            "the value never changes; nothing is known of its noise but that it is below a count".to_owned()
         }
-        Effect::NoiseBelowCount(of) => text(
-            format!(
-                "the Allan deviation at the shortest averaging times is {:.2} counts where it is nearest to the {:.2} counts from which \
-                 on rounding adds white noise alone",
-                of.counts, of.dithered_counts
-            ),
-            "; N, B and K are those of the rounded values",
+        Effect::NoiseBelowCount(of) => format!(
+            "the Allan deviation at the shortest averaging times is {:.2} counts where it is nearest to the {:.2} counts from which \
+             on rounding adds white noise alone; N, B and K are those of the rounded values",
+            of.counts, of.dithered_counts
         ),
-        Effect::Spikes(of) => text(
-            format!(
-                "{} off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ",
-                counted(of.count as u64, "sample"),
-                of.threshold_sigmas,
-                of.largest_sigmas
-            ),
-            "; an electrical disturbance or a damaged word",
+        Effect::Spikes(of) => format!(
+            "{} off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ; an electrical disturbance or a \
+             damaged word",
+            counted(of.count as u64, "sample"),
+            of.threshold_sigmas,
+            of.largest_sigmas
         ),
         Effect::NoisyInterval(of) => {
             let shown = match of.channels.len() {
                 0 | 1 => "this channel alone".to_owned(),
                 count => format!("{count} channels ({})", of.channels.join(", ")),
             };
-            text(
-                format!(
-                    "from {:.1} s to {:.1} s the noise at τ = {:.3} s is {:.2} times that of the stretches around it, by chance \
-                     {}, in {shown}",
-                    of.from_s.value,
-                    of.to_s.value,
-                    of.tau_s,
-                    of.level.value,
-                    chance(of.p_value)
-                ),
-                "; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
+            format!(
+                "from {:.1} s to {:.1} s the noise at τ = {:.3} s is {:.2} times that of the stretches around it, by chance {}, in \
+                 {shown}; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
+                of.from_s.value,
+                of.to_s.value,
+                of.tau_s,
+                of.level.value,
+                chance(of.p_value)
             )
         }
-        Effect::MotionInterval(of) => text(
-            format!(
-                "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} {} s: the platform was \
-                 moved",
-                of.size.value,
-                match of.scale {
-                    MotionScale::BiasError(error) => format!(
-                        "more than three times the {error:.3} {} by which the biases of parts differ",
-                        of.size.unit
-                    ),
-                    MotionScale::Scatter(scatter) =>
-                        format!("where such means scatter by {} {}", significant(scatter, 2), of.size.unit),
-                },
-                if of.stretches == 1 {
-                    "one stretch of".to_owned()
-                } else {
-                    format!("{} stretches of together", of.stretches)
-                },
-                of.moved_s,
-                unit = of.size.unit
-            ),
-            "",
+        Effect::MotionInterval(of) => format!(
+            "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} {} s: the platform was moved",
+            of.size.value,
+            match of.scale {
+                MotionScale::BiasError(error) =>
+                    format!("more than three times the {error:.3} {} by which the biases of parts differ", of.size.unit),
+                MotionScale::Scatter(scatter) =>
+                    format!("where such means scatter by {} {}", significant(scatter, 2), of.size.unit),
+            },
+            if of.stretches == 1 {
+                "one stretch of".to_owned()
+            } else {
+                format!("{} stretches of together", of.stretches)
+            },
+            of.moved_s,
+            unit = of.size.unit
         ),
-        Effect::Saturation(of) => text(
-            format!(
-                "{} of {} samples lie at {}, {:.4} {}, no other value occurs more than {} times: what is beyond is cut off, and N, \
-                 B and K are lower limits",
-                of.cut_off,
-                of.samples,
-                if of.is_end_of_range { "the end of the range" } else { "a limit" },
-                of.level.value,
-                of.level.unit,
-                of.most_of_others
-            ),
-            "",
+        Effect::Saturation(of) => format!(
+            "{} of {} samples lie at {}, {:.4} {}, no other value occurs more than {} times: what is beyond is cut off, and N, B and \
+             K are lower limits",
+            of.cut_off,
+            of.samples,
+            if of.is_end_of_range { "the end of the range" } else { "a limit" },
+            of.level.value,
+            of.level.unit,
+            of.most_of_others
         ),
-        Effect::MissingCodes(of) => text(
-            format!(
-                "{} without a sample, beside {:.0} in their rarer neighbours",
-                counted(of.codes.into(), "code"),
-                of.expected
-            ),
-            "",
+        Effect::MissingCodes(of) => format!(
+            "{} without a sample, beside {:.0} in their rarer neighbours",
+            counted(of.codes.into(), "code"),
+            of.expected
         ),
-        Effect::StuckOutput(of) => text(
-            format!(
-                "{} of {} samples are in {} of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
-                of.stuck,
-                of.samples,
-                counted(of.runs, "run"),
-                of.from_s.value,
-                of.to_s.value
-            ),
-            "; they are left out",
+        Effect::StuckOutput(of) => format!(
+            "{} of {} samples are in {} of equal values that noise does not make, the longest from {:.2} s to {:.2} s; they are left \
+             out",
+            of.stuck,
+            of.samples,
+            counted(of.runs, "run"),
+            of.from_s.value,
+            of.to_s.value
         ),
-        Effect::DroppedSamples(of) => text(
-            format!("{} of {} samples never arrived, in {}", of.missing, of.samples, counted(of.gaps as u64, "gap")),
-            "; a reader that comes too late, or a full queue",
+        Effect::DroppedSamples(of) => format!(
+            "{} of {} samples never arrived, in {}; a reader that comes too late, or a full queue",
+            of.missing,
+            of.samples,
+            counted(of.gaps as u64, "gap")
         ),
-        Effect::RepeatedSamples(of) => text(
-            format!(
-                "{} of {} samples equal the one before in all {} channels, {:.1} at most by chance",
-                of.equal, of.samples, of.channels, of.by_chance
-            ),
-            "; a register that is read before it is renewed",
+        Effect::RepeatedSamples(of) => format!(
+            "{} of {} samples equal the one before in all {} channels, {:.1} at most by chance; a register that is read before it is \
+             renewed",
+            of.equal, of.samples, of.channels, of.by_chance
         ),
-        Effect::ClockDeviation(ClockDeviation { change: Some(of), .. }) => text(
-            format!(
-                "{:.4} Hz by the time stamps up to {:.0} s and {:.4} Hz from then on, {:.1} σ apart; neither wanders",
-                of.before_hz.value, of.time_s.value, of.after_hz.value, of.sigmas
-            ),
-            "",
+        Effect::ClockDeviation(ClockDeviation { change: Some(of), .. }) => format!(
+            "{:.4} Hz by the time stamps up to {:.0} s and {:.4} Hz from then on, {:.1} σ apart; neither wanders",
+            of.before_hz.value, of.time_s.value, of.after_hz.value, of.sigmas
         ),
-        Effect::ClockDeviation(of) => text(
-            format!(
-                "{:.4} Hz by the time stamps, {:+.1} ppm from the nominal {:.4} Hz, {:.1} σ of an ordinary host's clock",
-                of.rate_hz.value,
-                1e6 * (of.rate_hz.value / of.nominal_hz - 1.0),
-                of.nominal_hz,
-                of.sigmas
-            ),
-            "; the tolerance of the part's oscillator",
+        Effect::ClockDeviation(of) => format!(
+            "{:.4} Hz by the time stamps, {:+.1} ppm from the nominal {:.4} Hz, {:.1} σ of an ordinary host's clock; the tolerance of \
+             the part's oscillator",
+            of.rate_hz.value,
+            1e6 * (of.rate_hz.value / of.nominal_hz - 1.0),
+            of.nominal_hz,
+            of.sigmas
         ),
         Effect::Unexplained(of) => unexplained(of),
     }
 }
 
-fn modulated(of: &ModulatedLine) -> EvidenceText {
+fn modulated(of: &ModulatedLine) -> String {
     let (frequency_hz, period_s) = (of.frequency_hz.value, of.period_s.value);
     match &of.evidence {
         ModulationEvidence::Envelope { sigmas } => {
@@ -420,27 +328,22 @@ fn modulated(of: &ModulatedLine) -> EvidenceText {
             } else {
                 ("its amplitude swells and fades", format!("{:.0} %", 100.0 * of.depth.value))
             };
-            text(
-                format!(
-                    "a line at {frequency_hz:.4} Hz, {sigmas:.0} σ, whose sidebands are {:.4} Hz away: {changes} by {depth} \
-                     every {period_s:.0} s",
-                    1.0 / period_s
-                ),
-                ", which no sinusoid does",
+            format!(
+                "a line at {frequency_hz:.4} Hz, {sigmas:.0} σ, whose sidebands are {:.4} Hz away: {changes} by {depth} every \
+                 {period_s:.0} s, which no sinusoid does",
+                1.0 / period_s
             )
         }
-        ModulationEvidence::Sidebands(line) => text(
-            format!(
-                "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every \
-                 {period_s:.0} s, which no sinusoid of one amplitude does",
-                1.0 / period_s
-            ),
-            format!("; {}", of_line(line).sentence()),
+        ModulationEvidence::Sidebands(line) => format!(
+            "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every {period_s:.0} \
+             s, which no sinusoid of one amplitude does; {}",
+            1.0 / period_s,
+            of_line(line)
         ),
     }
 }
 
-fn of_line(line: &LineEvidence) -> EvidenceText {
+fn of_line(line: &LineEvidence) -> String {
     let meaning = if line.has_width {
         "a narrow band: a mechanical resonance or an unsteady vibration"
     } else {
@@ -455,42 +358,37 @@ fn of_line(line: &LineEvidence) -> EvidenceText {
                 || "no wider than the record resolves".to_owned(),
                 |width_hz| format!("{width_hz:.4} Hz wide"),
             );
-            text(
-                format!(
-                    "line at {:.4} Hz in the spectrum, {width}, {:.0} σ, by chance anywhere {}",
-                    of.frequency_hz,
-                    of.sigmas,
-                    chance(of.p_value)
-                ),
-                format!("; {meaning}"),
+            format!(
+                "line at {:.4} Hz in the spectrum, {width}, {:.0} σ, by chance anywhere {}; {meaning}",
+                of.frequency_hz,
+                of.sigmas,
+                chance(of.p_value)
             )
         }
     }
 }
 
 /// A line, perhaps one of several of one signal.
-fn harmonic(multiples: Option<&Multiples>, line: &LineEvidence) -> EvidenceText {
+fn harmonic(multiples: Option<&Multiples>, line: &LineEvidence) -> String {
     match multiples {
         None => of_line(line),
         Some(multiples) => {
-            text(format!("{} of one periodic signal", harmonics(multiples)), format!("; {}", of_line(line).sentence()))
+            format!("{} of one periodic signal; {}", harmonics(multiples), of_line(line))
         }
     }
 }
 
-fn unexplained(of: &Unexplained) -> EvidenceText {
+fn unexplained(of: &Unexplained) -> String {
     let percent = of.excess_percent.map_or(0.0, |of| of.value);
     let frequency_hz = of.frequency_hz().map_or(0.0, |of| of.value);
     match &of.observation {
-        Observation::PointOfCurve { p_value } => text(
-            format!(
-                "{percent:+.0} % of the model's Allan deviation at τ = {:.3} s, by chance anywhere in the curve {}",
-                of.tau_s().map_or(0.0, |of| of.value),
-                chance(*p_value)
-            ),
-            "; no effect that is known here explains it",
+        Observation::PointOfCurve { p_value } => format!(
+            "{percent:+.0} % of the model's Allan deviation at τ = {:.3} s, by chance anywhere in the curve {}; no effect that is \
+             known here explains it",
+            of.tau_s().map_or(0.0, |of| of.value),
+            chance(*p_value)
         ),
-        Observation::RefutedTerm { curve, by } => text(format!("{} {}", excess(curve), refutation(by)), ""),
+        Observation::RefutedTerm { curve, by } => format!("{} {}", excess(curve), refutation(by)),
         Observation::Band { width_hz, sigmas, mismatch } => {
             let why = match mismatch {
                 BandMismatch::Shape { p_value } => format!(
@@ -499,20 +397,14 @@ fn unexplained(of: &Unexplained) -> EvidenceText {
                 ),
                 BandMismatch::Curve => "the Allan deviation contradicts a resonance there".to_owned(),
             };
-            text(
-                format!(
-                    "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} σ) and {why}"
-                ),
-                "",
+            format!(
+                "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} σ) and {why}"
             )
         }
-        Observation::LevelByTemperature { range_degc: [coldest, warmest], explained } => text(
-            format!(
-                "the level of the noise changes by {percent:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes \
-                 follow the measured temperature, and no effect that is known here changes it",
-                100.0 * explained
-            ),
-            "",
+        Observation::LevelByTemperature { range_degc: [coldest, warmest], explained } => format!(
+            "the level of the noise changes by {percent:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes follow \
+             the measured temperature, and no effect that is known here changes it",
+            100.0 * explained
         ),
     }
 }
@@ -556,8 +448,8 @@ fn filter_meaning(of: &OutputFilter) -> String {
         return format!("neighbours correlate as behind a {window} of {taps} taps a stage");
     }
     format!(
-        "neighbours correlate as behind a {window} of {taps} taps a stage that is read every {decimation:.2} values; at the part's own \
-         {} Hz that is a sample rate of {:.1} Hz",
+        "neighbours correlate as behind a {window} of {taps} taps a stage that is read every {decimation:.2} values; at the part's \
+         own {} Hz that is a sample rate of {:.1} Hz",
         of.internal_rate_hz,
         of.internal_rate_hz / decimation
     )

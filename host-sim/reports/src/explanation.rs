@@ -2,8 +2,8 @@
 
 use crate::finding_text::channel_list;
 use crate::formatting::{capital, count, words};
-use crate::rounding::{NONE, signed, significant, span};
-use crate::summary::off_percent;
+use crate::rounding::{NONE, extremes, signed, significant, span};
+use crate::summary::{self, off_percent};
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
 
@@ -51,10 +51,15 @@ pub(crate) fn model(channel: &ChannelReport) -> String {
         error.rms_percent.map_or_else(|| NONE.to_owned(), |of| format!("{} %", off_percent(of)))
     };
     let terms: Vec<String> = channel.after.terms.iter().map(|term| words(term.kind())).collect();
-    let excluding = channel.before.unseen_excluding.as_ref().zip(channel.after.unseen_excluding.as_ref());
+    let [without, with] = summary::models(channel);
+    let excluding = without.unseen_excluding.as_ref().zip(with.unseen_excluding.as_ref());
     let excluding = excluding.map_or_else(String::new, |(before, after)| {
         format!(" Without the spikes and knocks of both halves {} become {}.", off(before), off(after))
     });
+    let error = match channel.effects.is_empty() {
+        true => off(&with.unseen),
+        false => format!("{} with N, B and K, and by {} with what was found", off(&without.unseen), off(&with.unseen)),
+    };
     let events = channel.after.events.as_ref().map_or_else(String::new, |events| {
         let rate = &events.rate_per_hour;
         format!(
@@ -65,10 +70,8 @@ pub(crate) fn model(channel: &ChannelReport) -> String {
         )
     });
     format!(
-        "On the second half, which the models had not seen, σ is off by {} with N, B and K, and by {} with what was found ({}{events}). \
+        "On the second half, which the models had not seen, σ is off by {error} ({}{events}). \
          The curve of the first half itself is off by {}: a model of stationary noise cannot be expected to do better.{excluding}",
-        off(&channel.before.unseen),
-        off(&channel.after.unseen),
         terms.join(", "),
         off(&channel.first_half_curve),
     )
@@ -96,10 +99,7 @@ fn stationarity(changes: &Nonstationarity) -> String {
 }
 
 fn movement(changes: &Nonstationarity) -> String {
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-    };
-    let (low, high) = range(&mut changes.epochs.iter().map(|epoch| 100.0 * (epoch.white_noise_ratio - 1.0)));
+    let (low, high) = extremes(changes.epochs.iter().map(|epoch| 100.0 * (epoch.white_noise_ratio - 1.0)));
     let error = changes.epochs.iter().map(|epoch| epoch.white_noise_error).fold(0.0, f64::max);
     let level = format!(
         "from one stretch of {} to the next the variance of the white noise lies between {} % and {} % of the model's own (each \
@@ -109,8 +109,7 @@ fn movement(changes: &Nonstationarity) -> String {
         signed(high, 2),
         significant(100.0 * error, 2),
     );
-    let lines = changes.epochs.iter().filter_map(|epoch| epoch.line_hz);
-    let (lowest, highest) = range(&mut lines.clone());
+    let (lowest, highest) = extremes(changes.epochs.iter().filter_map(|epoch| epoch.line_hz));
     match changes.tracked {
         TrackedSet::Nothing => format!("No parameter of the first half moves: {level}."),
         TrackedSet::Level => format!("The white noise of the first half moves: {level}."),
@@ -150,13 +149,10 @@ fn share(part: usize, whole: usize) -> String {
 }
 
 fn related_line(name: &str, related: &RelatedLine) -> String {
-    let own = channel_list(&[name.to_owned()]);
-    let other = channel_list(std::slice::from_ref(&related.channel));
-    let (above, below) = related.ratio;
-    let ratio = if (above, below) == (1, 1) {
-        "the same frequency".to_owned()
-    } else {
-        format!("{above}/{below} of its frequency")
+    let [own, other] = [name, related.channel.as_str()].map(|name| channel_list([name]));
+    let ratio = match related.ratio {
+        (1, 1) => "the same frequency".to_owned(),
+        (above, below) => format!("{above}/{below} of its frequency"),
     };
     format!(
         "The line shows in {other} too, at {ratio}: the frequencies of the first half have the ratio {:.4} ± {:.4}, and their steps \
@@ -183,32 +179,27 @@ fn coverage<'a>(channels: impl Iterator<Item = &'a Nonstationarity>, epoch_s: f6
 }
 
 fn common_mode(of: &CommonModeRegression) -> Vec<String> {
-    let names = |at: usize| channel_list(std::slice::from_ref(&of.channels[at]));
     let list = |values: &[f64], text: &dyn Fn(f64) -> String| -> String {
-        values
-            .iter()
-            .enumerate()
-            .map(|(at, &value)| format!("{} {}", names(at), text(value)))
-            .collect::<Vec<_>>()
-            .join(", ")
+        let each =
+            of.channels.iter().zip(values).map(|(name, &value)| format!("{} {}", channel_list([name]), text(value)));
+        each.collect::<Vec<_>>().join(", ")
     };
-    let nearest = |taus: &mut dyn Iterator<Item = f64>, tau: f64| {
-        taus.enumerate().min_by(|a, b| (a.1 / tau).ln().abs().total_cmp(&(b.1 / tau).ln().abs())).map(|(at, _)| at)
+    // The nearest of `taus` to each of `wanted`.
+    let nearest = |taus: &[f64], wanted: &[f64]| {
+        let distance = |at: usize, tau: f64| (taus[at] / tau).ln().abs();
+        let near = |&tau: &f64| (0..taus.len()).min_by(|&a, &b| distance(a, tau).total_cmp(&distance(b, tau)));
+        let mut places: Vec<usize> = wanted.iter().filter_map(near).collect();
+        places.dedup();
+        places
     };
-    let mut places: Vec<usize> =
-        COMMON_MODE_TAU_S.iter().filter_map(|&tau| nearest(&mut of.shares.iter().map(|at| at.tau_s), tau)).collect();
-    places.dedup();
-    let shares = places.iter().map(|&at| {
+    let taus: Vec<f64> = of.shares.iter().map(|at| at.tau_s).collect();
+    let shares = nearest(&taus, &COMMON_MODE_TAU_S).into_iter().map(|at| {
         let octave = &of.shares[at];
         let shown = list(&octave.share, &|share| format!("{:.0} %", 100.0 * share));
         format!("At τ = {} the other channels predict of the variance in the first half: {shown}.", span(octave.tau_s))
     });
-    let mut places: Vec<usize> = COMMON_MODE_TAU_S[1..]
-        .iter()
-        .filter_map(|&tau| nearest(&mut of.gains.iter().map(|at| at.tau_s), tau))
-        .collect();
-    places.dedup();
-    let gains = places.iter().map(|&at| {
+    let taus: Vec<f64> = of.gains.iter().map(|at| at.tau_s).collect();
+    let gains = nearest(&taus, &COMMON_MODE_TAU_S[1..]).into_iter().map(|at| {
         let octave = &of.gains[at];
         let shown = list(&octave.ratio, &|ratio| format!("{ratio:.2}"));
         format!(
@@ -218,12 +209,12 @@ fn common_mode(of: &CommonModeRegression) -> Vec<String> {
             span(octave.tau_s),
         )
     });
-    let untrusted: Vec<String> =
-        (0..of.channels.len()).filter(|&at| !of.trusted[at]).map(|at| of.channels[at].clone()).collect();
+    let untrusted: Vec<&String> =
+        of.channels.iter().zip(&of.trusted).filter(|(_, is)| !**is).map(|(name, _)| name).collect();
     let note = (!untrusted.is_empty()).then(|| {
         format!(
             "In {} the weights of the first quarter did not make the second quarter better: do not subtract them there.",
-            channel_list(&untrusted)
+            channel_list(untrusted)
         )
     });
     shares.chain(gains).chain(note).collect()

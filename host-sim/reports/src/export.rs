@@ -8,11 +8,11 @@ mod visual_inertial;
 
 pub use exported_file::{AxisChoice, Export, ExportError};
 
+use crate::coefficients::KINDS;
 use crate::saved_report::{SavedChannel, SavedReport};
 use crate::summary::{HIGH_DEVIANCE, deviance_per_point};
 use std::fmt::Write;
 
-/// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum ExportFormat {
     /// `imu.yaml` of Kalibr.
@@ -94,8 +94,6 @@ fn warned(text: String, report: &SavedReport, format: ExportFormat) -> String {
 
 /// Largest coefficient; larger ones overflow in a change of units.
 const MAX_COEFFICIENT: f64 = 1e30;
-/// Terms whose coefficients are deviations.
-const NOISES: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
 
 /// Refuses what a file of another program cannot represent.
 fn check(report: &SavedReport) -> Result<(), ExportError> {
@@ -107,7 +105,7 @@ fn check(report: &SavedReport) -> Result<(), ExportError> {
         name(&channel.name)?;
         for term in &channel.refitted.terms {
             name(&term.kind)?;
-            let least = if NOISES.contains(&term.kind.as_str()) { 0.0 } else { -MAX_COEFFICIENT };
+            let least = if KINDS.contains(&term.kind.as_str()) { 0.0 } else { -MAX_COEFFICIENT };
             for (parameter, of) in &term.parameters {
                 name(parameter)?;
                 name(&of.unit)?;

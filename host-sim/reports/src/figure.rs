@@ -7,14 +7,23 @@ mod plot;
 
 use crate::finding_text::{channel_list, channel_name};
 use crate::live::LiveCurve;
+use crate::rounding::{quantity, span};
 use crate::summary;
-use axis::{Axis, has_logarithm};
+use axis::has_logarithm;
 pub(crate) use channel::bias_plot;
 use channel::{allan_deviation_plot, measured, spectrum_plot};
 pub(crate) use evidence::evidence;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Report};
 pub(crate) use plot::Plot;
-use plot::{LEFT, Line, Look, Panel, RIGHT, frames, heights, places};
+use plot::{Line, Look, Panel, frames};
+
+const TAU: &str = "averaging time τ, s";
+/// Looks of the channels of one unit.
+const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
+
+fn deviation_label(unit: &str) -> String {
+    format!("Allan deviation σ(τ), {}", crate::rounding::unit(unit))
+}
 
 /// Growing curves of the channels with `prefix`; `None` without a point.
 pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
@@ -22,25 +31,16 @@ pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
     let shown = curves.iter().filter(|curve| curve.channel.starts_with(prefix) && curve.points.iter().any(is_shown));
     let curves: Vec<&LiveCurve> = shown.collect();
     let first = curves.first()?;
-    let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis].into_iter().cycle();
     let line = |(curve, look): (&&LiveCurve, Look)| {
-        let name = channel_list(std::slice::from_ref(&curve.channel));
+        let name = channel_list([&curve.channel]);
         Line::new(name, look, curve.points.iter().copied().filter(is_shown).collect()).with_dots()
     };
-    let lines: Vec<Line> = curves.iter().zip(looks).map(line).collect();
-    let [frame] = frames([330.0]);
-    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let label = format!("Allan deviation σ(τ), {}", crate::rounding::unit(&first.unit));
-    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
-    Some(Plot {
-        id: format!("{prefix}live"),
-        title: "Allan deviation, while the record grows".to_owned(),
-        description: String::new(),
-        panels: vec![Panel::new(across, up, lines)],
-    })
+    let lines: Vec<Line> = curves.iter().zip(LOOKS.into_iter().cycle()).map(line).collect();
+    let panel = Panel::logarithmic(TAU, &deviation_label(&first.unit), lines, frames([330.0])[0]);
+    Some(Plot::new(format!("{prefix}live"), "Allan deviation, while the record grows", "", [panel]))
 }
 
-/// Colours of a class on light and dark ground: contrast of at least 4.5:1.
+/// Class and colours of each [`Look`] on light and dark ground: contrast of at least 4.5:1.
 const COLOURS: [(&str, &str, &str); 8] = [
     ("measured", "#1f5fa8", "#6cb2ff"),
     ("second", "#a8480d", "#ffab5e"),
@@ -51,13 +51,17 @@ const COLOURS: [(&str, &str, &str); 8] = [
     ("reference", "#5b6675", "#9aa7b8"),
     ("followed", "#a8286b", "#ff8fc4"),
 ];
-/// Text, faint text, grid, fine grid and ground, light and dark.
-const TEXT: [&str; 2] = ["#1c2430", "#e6eaf0"];
-const GRID: [&str; 2] = ["#ccd4dd", "#364152"];
-const FINE: [&str; 2] = ["#eaeef3", "#222b37"];
-const FRAME: [&str; 2] = ["#5b6675", "#9aa7b8"];
-const PAPER: [&str; 2] = ["#ffffff", "#171e28"];
-const PLACE: [&str; 2] = ["#f6e3ef", "#3d2236"];
+/// Rules of all else, with a colour on light and dark ground.
+const RULES: [(&str, &str, &str); 8] = [
+    ("svg text{fill", "#1c2430", "#e6eaf0"),
+    (".grid{stroke", "#ccd4dd", "#364152"),
+    (".fine{stroke", "#eaeef3", "#222b37"),
+    (".frame{stroke", "#5b6675", "#9aa7b8"),
+    (".paper{fill", "#ffffff", "#171e28"),
+    ("rect.place{fill", "#f6e3ef", "#3d2236"),
+    ("line.place{stroke", "#a8286b", "#ff8fc4"),
+    (".cursor{stroke", "#1c2430", "#e6eaf0"),
+];
 
 /// A figure of the page or of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,18 +79,8 @@ pub(crate) fn style() -> [String; 2] {
             let colour = [light, dark][ground];
             format!(".{class} line,.{class} path{{stroke:{colour}}}.{class} circle,path.{class}{{fill:{colour}}}")
         };
-        let lines: String = COLOURS.iter().map(of).collect();
-        format!(
-            "svg text{{fill:{text}}}.grid{{stroke:{grid}}}.fine{{stroke:{fine}}}.frame{{stroke:{frame}}}\
-             .paper{{fill:{paper}}}rect.place{{fill:{place}}}line.place{{stroke:{mark}}}.cursor{{stroke:{text}}}{lines}",
-            text = TEXT[ground],
-            grid = GRID[ground],
-            fine = FINE[ground],
-            frame = FRAME[ground],
-            paper = PAPER[ground],
-            place = PLACE[ground],
-            mark = [COLOURS[7].1, COLOURS[7].2][ground],
-        )
+        let rules = RULES.iter().map(|(rule, light, dark)| format!("{rule}:{}}}", [light, dark][ground]));
+        rules.chain(COLOURS.iter().map(of)).collect::<String>()
     };
     const SHAPES: &str = "svg text{font-size:13px;font-family:system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}\
         svg .axis{font-size:14px}.grid,.fine,.frame{stroke-width:1;fill:none}\
@@ -128,9 +122,9 @@ pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
 /// The channel whose effects lower its error on the unseen half most, else that of the largest error; or `None`.
 pub(crate) fn story(report: &Report) -> Option<Plot> {
     let errors: Vec<(&ChannelReport, [f64; 2])> = summary::inertial(report)
-        .filter_map(|channel| match summary::unseen_errors(channel) {
-            [Some(before), Some(after)] => Some((channel, [before, after])),
-            _ => None,
+        .filter_map(|channel| {
+            let [before, after] = summary::models(channel).map(|model| model.unseen.deviance_per_point);
+            Some((channel, [before?, after?]))
         })
         .collect();
     let gains = errors.iter().filter(|(_, [before, after])| before > after);
@@ -161,38 +155,30 @@ fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
     let of_prefix = report.channels.iter().filter(|channel| channel.name.starts_with(prefix));
     let channels: Vec<&ChannelReport> = of_prefix.filter(has_curve).collect();
     let first = channels.first()?;
-    let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
     let of_channel = |(channel, look): (&&ChannelReport, Look)| {
         let name = channel_name(channel);
         let model = channel::model_line(channel, &channel.refitted, &format!("model of {name}"), look).unlisted();
         [model, measured(channel, look, &name)]
     };
-    let mut lines: Vec<Line> = channels.iter().zip(looks.into_iter().cycle()).flat_map(of_channel).collect();
+    let mut lines: Vec<Line> = channels.iter().zip(LOOKS.into_iter().cycle()).flat_map(of_channel).collect();
     let sheet = first.figure_data.data_sheet.as_ref();
     if let Some(sheet) = sheet {
         let taus: Vec<f64> = first.curve.iter().map(|point| point.tau_s).filter(|tau| has_logarithm(*tau)).collect();
         lines.push(data_sheet_line(sheet, &taus));
     }
-    let [frame] = frames([300.0]);
-    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let label = format!("Allan deviation σ(τ), {}", crate::rounding::unit(&first.unit));
-    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
+    let panel = Panel::logarithmic(TAU, &deviation_label(&first.unit), lines, frames([300.0])[0]);
     let each: Vec<String> = channels
         .iter()
         .filter_map(|channel| {
             let lowest = channel.curve.iter().min_by(|a, b| a.adev.total_cmp(&b.adev))?;
-            let name = channel_name(channel);
-            let (deviation, tau) =
-                (crate::rounding::quantity(lowest.adev, &channel.unit), crate::rounding::span(lowest.tau_s));
-            Some(format!("{name} is lowest at {tau} with {deviation}"))
+            let (tau, deviation) = (span(lowest.tau_s), quantity(lowest.adev, &channel.unit));
+            Some(format!("{} is lowest at {tau} with {deviation}", channel_name(channel)))
         })
         .collect();
-    Some(Plot {
-        id: format!("overview-{name}"),
-        title: format!("Allan deviation of the {name}{}", if sheet.is_some() { ", beside the data sheet" } else { "" }),
-        description: format!("Points with 95 % bounds: measured. Lines: models. {}.", each.join("; ")),
-        panels: vec![Panel::new(across, up, lines)],
-    })
+    let title =
+        format!("Allan deviation of the {name}{}", if sheet.is_some() { ", beside the data sheet" } else { "" });
+    let description = format!("Points with 95 % bounds: measured. Lines: models. {}.", each.join("; "));
+    Some(Plot::new(format!("overview-{name}"), title, description, [panel]))
 }
 
 /// The data sheet's drawn curve with its scatter over parts, or the stated values at `taus`.

@@ -1,11 +1,10 @@
 //! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
 use crate::line_breaks::broken;
-use crate::rounding::{NONE, quantity_digits, significant, span};
-use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use crate::rounding::{NONE, grouped, quantity_digits, significant, span};
+use comfy_table::{Table, presets};
 use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
-use std::fmt;
 
 /// Four significant digits; [`NONE`] if not finite.
 pub fn number(value: f64) -> String {
@@ -13,7 +12,6 @@ pub fn number(value: f64) -> String {
     if is_usual || !value.is_finite() { significant(value, 4) } else { format!("{value:.3e}") }
 }
 
-/// `value`, or [`NONE`].
 pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), number)
 }
@@ -25,15 +23,7 @@ pub fn percent(value: Option<f64>) -> String {
 
 /// A whole number with its thousands separated: `1,000,000`.
 pub fn count(value: u64) -> String {
-    let digits = value.to_string();
-    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
+    grouped(&value.to_string())
 }
 
 /// Lost, refused and replaced samples of a channel in one sentence; empty without any.
@@ -155,16 +145,14 @@ pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
 
 /// Deviations of the channel's models beyond chance, by half.
 pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
-    let (before, after) = (&channel.before, &channel.after);
-    let same = before == after;
-    let of = |name: &str, model: &ModelReport| {
-        let name = if same { "" } else { name };
-        let halves = [(&model.fitted, "the fitted half"), (&model.unseen, "the unseen half")];
-        let told = halves.into_iter().filter_map(|(error, data)| worst_deviation(error, data));
-        told.map(|text| if name.is_empty() { text } else { format!("{name}: {text}") }).collect::<Vec<_>>()
+    let (before, after) = (("before: ", &channel.before), ("after: ", &channel.after));
+    let models = if channel.before == channel.after { vec![("", &channel.after)] } else { vec![before, after] };
+    let told = |(name, model): (&str, &ModelReport)| {
+        let halves = [(&model.fitted, "the fitted half"), (&model.unseen, "the unseen half")].into_iter();
+        let told = halves.filter_map(|(error, data)| worst_deviation(error, data));
+        told.map(|text| format!("{name}{text}")).collect::<Vec<_>>()
     };
-    let after = of("after", after);
-    if same { after } else { of("before", before).into_iter().chain(after).collect() }
+    models.into_iter().flat_map(told).collect()
 }
 
 /// Recording time for a coefficient within ±20 %.
@@ -182,40 +170,11 @@ pub fn wrap(text: &str, width: usize) -> String {
     broken(text, width, "  ").join("\n")
 }
 
-/// A table in a frame of box characters. `Display` writes no final line break.
-pub struct TextTable(Table);
-
-impl TextTable {
-    /// `left` columns are aligned left, the others right.
-    pub fn new<H: Into<String>>(
-        header: impl IntoIterator<Item = H>,
-        left: usize,
-        rows: impl IntoIterator<Item = Vec<String>>,
-    ) -> Self {
-        let mut table = Table::new();
-        table
-            .load_preset(presets::UTF8_FULL_CONDENSED)
-            .apply_modifier(modifiers::UTF8_ROUND_CORNERS)
-            .set_content_arrangement(ContentArrangement::Disabled)
-            .set_header(header.into_iter().map(Into::into).collect::<Vec<String>>())
-            .add_rows(rows);
-        for column in table.column_iter_mut().skip(left) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-        Self(table)
-    }
-
-    /// At most `width` columns wide; longer cells are broken.
-    pub fn within(mut self, width: u16) -> Self {
-        self.0.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
-        self
-    }
-}
-
-impl fmt::Display for TextTable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
+/// A table without a frame.
+pub(crate) fn plain_table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(header);
+    table
 }
 
 #[cfg(test)]

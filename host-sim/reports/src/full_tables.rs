@@ -1,20 +1,23 @@
 //! Every table of a report as text of at most 100 columns.
 
 use crate::coefficient_notes::coefficient_notes;
-use crate::coefficients::{self, CoefficientRow};
+use crate::coefficients::KINDS;
 use crate::curve_numbers::curve_numbers;
-use crate::evidence::EvidenceText;
+use crate::evidence;
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
-    TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
-    parameter_name, percent, recording_advice, words, worst_deviations, wrap,
+    count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name, percent,
+    recording_advice, words, worst_deviations, wrap,
 };
 use crate::rounding::{NONE, Scale, p_value, parameter_magnitude, quantity_digits, unit};
 use crate::summary;
+use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::report::assessment::navigation::CALIBRATION_S;
 use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
-use noise_analysis::report::{ChannelEffect, ChannelReport, Report, TermReport};
+use noise_analysis::report::{
+    ChannelEffect, ChannelReport, ModelErrorReport, Parameter, Report, SlopeMethodReport, SlopeMethodValue, TermReport,
+};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
@@ -23,10 +26,7 @@ const WIDTH: u16 = 100;
 /// Writes the whole report with the recording's name.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
     let title = format!("{} noise report", summary::part_name(report));
-    match source {
-        Some(source) => writeln!(out, "{title}   {source}")?,
-        None => writeln!(out, "{title}")?,
-    }
+    writeln!(out, "{title}{}", source.map_or_else(String::new, |source| format!("   {source}")))?;
     writeln!(out, "{}", "═".repeat(title.chars().count()))?;
     writeln!(out, "sample rate  {}", quantity_digits(report.sample_rate_hz, "Hz", 4))?;
     let length = duration(report.samples as f64 / report.sample_rate_hz);
@@ -44,31 +44,31 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     for text in together {
         writeln!(out, "{}", wrap(&format!("• {text}"), WIDTH.into()))?;
     }
+    let any = |is_so: fn(&ChannelReport) -> bool| report.channels.iter().any(is_so);
+    let error_after =
+        format!("error after t: rms of the integral over t when the bias is the mean of the {CALIBRATION_S} s before.");
+    let notes = [
+        (true, NOTES),
+        (any(summary::is_fitted_to_later_quarter), LATER_QUARTER),
+        (true, "by PSD: σ(τ) by equation (5), from the measured spectrum instead of differences of means."),
+        (any(|channel| channel.after.unseen_excluding.is_some()), EXCLUDING),
+        (true, error_after.as_str()),
+    ];
     writeln!(out)?;
-    writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
-    writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
-    writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")?;
-    writeln!(out, "worst σ: largest deviation of a point over all τ; beyond ±4 it is told in words.")?;
-    writeln!(out, "first half's curve: the measured curve taken for a model; what the second half does not repeat.")?;
-    if report.channels.iter().any(summary::is_fitted_to_later_quarter) {
-        writeln!(
-            out,
-            "later quarter: the model is fitted to the later quarter of the first half, as the noise changes."
-        )?;
-    }
-    writeln!(out, "by PSD: σ(τ) by equation (5), from the measured spectrum instead of differences of means.")?;
-    if report.channels.iter().any(|channel| channel.after.unseen_excluding.is_some()) {
-        writeln!(
-            out,
-            "excluding: without what the first half's rules for spikes and knocks find in the unseen half; the"
-        )?;
-        writeln!(out, "models after foretell these in the unseen half as recorded, at the rate of the first half.")?;
-    }
-    writeln!(
-        out,
-        "error after t: rms of the integral over t when the bias is the mean of the {CALIBRATION_S} s before."
-    )
+    notes.iter().filter(|(is_told, _)| *is_told).try_for_each(|(_, note)| writeln!(out, "{note}"))
 }
+
+const NOTES: &str = "\
+Intervals are of 95 %. The models are fitted to the first half of the samples; the second
+half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;
+rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.
+worst σ: largest deviation of a point over all τ; beyond ±4 it is told in words.
+first half's curve: the measured curve taken for a model; what the second half does not repeat.";
+const LATER_QUARTER: &str =
+    "later quarter: the model is fitted to the later quarter of the first half, as the noise changes.";
+const EXCLUDING: &str = "\
+excluding: without what the first half's rules for spikes and knocks find in the unseen half; the
+models after foretell these in the unseen half as recorded, at the rate of the first half.";
 
 /// The content of the screen, without its limits.
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
@@ -85,9 +85,8 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let (found, _) = summary::findings(report);
     writeln!(out, "\nWhat was found")?;
     for (index, finding) in found.iter().enumerate() {
-        let FindingText { channels, physics, advice, weight, .. } = finding;
-        let weight = if weight.is_empty() { String::new() } else { format!(" {}.", capital(weight)) };
-        paragraph(out, &format!("{}. {channels}: {physics}{weight} {advice}", index + 1))?;
+        let FindingText { channels, advice, .. } = finding;
+        paragraph(out, &format!("{}. {channels}: {} {advice}", index + 1, finding.sentences()))?;
     }
     for text in summary::unexplained(report) {
         paragraph(out, &format!("Not explained: {text}."))?;
@@ -136,7 +135,7 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
     }
     for ChannelEffect { effect, .. } in &channel.effects {
-        let evidence = EvidenceText::of_effect(effect).sentence();
+        let evidence = evidence::of_effect(effect);
         writeln!(out, "{}", wrap(&format!("• {}: {evidence}", words(effect.name())), WIDTH.into()))?;
     }
     for text in explanation::course(channel) {
@@ -152,28 +151,45 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", curve_table(channel))
 }
 
-fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> TextTable {
-    TextTable::new(header.iter().copied(), left, rows).within(WIDTH)
+/// In a frame; `left` columns are aligned left, the others right.
+fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_FULL_CONDENSED).apply_modifier(modifiers::UTF8_ROUND_CORNERS);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    table.set_header(header.to_vec()).add_rows(rows);
+    for column in table.column_iter_mut().skip(left) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
 }
 
-fn coefficient_table(channel: &ChannelReport) -> TextTable {
-    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit, 95 % interval"];
-    let row = |row: CoefficientRow<'_>| {
-        let shown =
-            row.slope_value.map(|value| value.value).into_iter().chain(row.fit.as_ref().map(parameter_magnitude));
-        let scale = Scale::new(shown, &row.unit);
-        let (by_slope, found) = match (row.slope_value, row.slope) {
-            (Some(value), _) => (scale.number(value.value, 3), interval(value.from_s, value.to_s)),
-            (None, "") => (NONE.to_owned(), NONE.to_owned()),
-            (None, _) => (NONE.to_owned(), "no such slope".to_owned()),
-        };
-        let fit = row.fit.as_ref().map_or_else(|| NONE.to_owned(), |fit| scale.estimate(fit));
-        vec![words(row.kind), scale.unit, by_slope, found, fit]
+fn coefficient_table(channel: &ChannelReport) -> Table {
+    let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
+    let terms = &channel.before.terms;
+    let classical = KINDS.into_iter().zip([angle_random_walk, bias_instability, rate_random_walk]);
+    let classical = classical.map(|(kind, slope)| {
+        let fit = terms.iter().find(|term| term.kind() == kind).map(TermReport::coefficient);
+        (kind, slope.as_ref(), "no such slope", fit)
+    });
+    let others = terms.iter().filter(|term| !KINDS.contains(&term.kind()));
+    let others =
+        others.flat_map(|term| term.parameters().into_values().map(move |of| (term.kind(), None, NONE, Some(of))));
+    let row = |(kind, slope, absent, fit): (&str, Option<&SlopeMethodValue>, &str, Option<Parameter>)| {
+        let unit = slope.map(|of| &of.unit).or(fit.as_ref().map(|of| &of.unit)).map_or("", String::as_str);
+        let shown = slope.map(|of| of.value).into_iter().chain(fit.as_ref().map(parameter_magnitude));
+        let scale = Scale::new(shown, unit);
+        let [by_slope, found] = slope.map_or_else(
+            || [NONE, absent].map(str::to_owned),
+            |of| [scale.number(of.value, 3), interval(of.from_s, of.to_s)],
+        );
+        let fit = fit.map_or_else(|| NONE.to_owned(), |fit| scale.estimate(&fit));
+        vec![words(kind), scale.unit, by_slope, found, fit]
     };
-    table(&header, 2, coefficients::rows(channel).into_iter().map(row))
+    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit, 95 % interval"];
+    table(&header, 2, classical.chain(others).map(row))
 }
 
-fn term_table(terms: &[TermReport]) -> TextTable {
+fn term_table(terms: &[TermReport]) -> Table {
     let rows = terms.iter().flat_map(|term| {
         term.parameters().into_iter().map(move |(name, parameter)| {
             let scale = Scale::new([parameter_magnitude(&parameter)], &parameter.unit);
@@ -185,47 +201,27 @@ fn term_table(terms: &[TermReport]) -> TextTable {
     table(&header, 3, rows)
 }
 
-fn error_table(channel: &ChannelReport) -> TextTable {
+fn error_table(channel: &ChannelReport) -> Table {
     let after = if summary::is_fitted_to_later_quarter(channel) { "after, later quarter" } else { "after" };
+    // Fitted, and unseen.
+    let row = |name: String, errors: [Option<&ModelErrorReport>; 2]| {
+        let cells = |text: &dyn Fn(&ModelErrorReport) -> String| errors.map(|of| of.map_or_else(String::new, text));
+        let [rms, deviance] = [cells(&|of| percent(of.rms_percent)), cells(&|of| optional(of.deviance_per_point))];
+        let worst = cells(&|of| optional(of.worst_sigma));
+        [name].into_iter().chain(rms).chain(deviance).chain(worst).collect::<Vec<String>>()
+    };
     let models = [("before", &channel.before), (after, &channel.after)].into_iter().flat_map(|(name, model)| {
-        let all = vec![
-            name.to_owned(),
-            percent(model.fitted.rms_percent),
-            percent(model.unseen.rms_percent),
-            optional(model.fitted.deviance_per_point),
-            optional(model.unseen.deviance_per_point),
-            optional(model.fitted.worst_sigma),
-            optional(model.unseen.worst_sigma),
-        ];
-        let excluding = model.unseen_excluding.as_ref().map(|error| {
-            vec![
-                format!("{name}, excluding"),
-                String::new(),
-                percent(error.rms_percent),
-                String::new(),
-                optional(error.deviance_per_point),
-                String::new(),
-                optional(error.worst_sigma),
-            ]
-        });
-        [Some(all), excluding].into_iter().flatten()
+        let excluding = model.unseen_excluding.as_ref();
+        let excluding = excluding.map(|error| row(format!("{name}, excluding"), [None, Some(error)]));
+        [row(name.to_owned(), [&model.fitted, &model.unseen].map(Some))].into_iter().chain(excluding)
     });
-    let own = &channel.first_half_curve;
-    let own_curve = vec![
-        "first half's curve".to_owned(),
-        String::new(),
-        percent(own.rms_percent),
-        String::new(),
-        optional(own.deviance_per_point),
-        String::new(),
-        optional(own.worst_sigma),
-    ];
+    let own_curve = row("first half's curve".to_owned(), [None, Some(&channel.first_half_curve)]);
     let rows = models.chain([own_curve]);
     let header = ["model error", "rms fitted", "unseen", "deviance fitted", "unseen", "worst σ fitted", "unseen"];
     table(&header, 1, rows)
 }
 
-fn curve_table(channel: &ChannelReport) -> TextTable {
+fn curve_table(channel: &ChannelReport) -> Table {
     let (headings, rows) = curve_numbers(channel);
     table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
 }
@@ -252,7 +248,7 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
     assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
 }
 
-fn unit_table(coefficients: &[Coefficient]) -> TextTable {
+fn unit_table(coefficients: &[Coefficient]) -> Table {
     let row = |coefficient: &Coefficient| {
         let scale = Scale::new([parameter_magnitude(&coefficient.value)], &coefficient.value.unit);
         let sense = if coefficient.discrete { "discrete, of samples" } else { "continuous" };
@@ -263,7 +259,7 @@ fn unit_table(coefficients: &[Coefficient]) -> TextTable {
     table(&header, 3, coefficients.iter().map(row))
 }
 
-fn drift_table(drifts: &[NavigationDrift]) -> TextTable {
+fn drift_table(drifts: &[NavigationDrift]) -> Table {
     let row = |drift: &NavigationDrift| {
         let observed = drift.observed.as_ref();
         let scale = Scale::new([drift.predicted].into_iter().chain(observed.map(parameter_magnitude)), &drift.unit);

@@ -1,7 +1,7 @@
 //! Reports of a noise analysis: the text of the terminal, the HTML page with its figures, exports for other programs.
 
 pub mod coefficient_notes;
-pub mod coefficients;
+mod coefficients;
 pub mod comparison;
 mod curve_numbers;
 mod evidence;

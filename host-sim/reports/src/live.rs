@@ -1,6 +1,7 @@
 //! The live view of a growing record: verdict, curves, findings, health of the source.
 
 use crate::finding_text::FindingText;
+use crate::rounding::extremes;
 use crate::summary::CoefficientTable;
 use crate::terminal::table_lines;
 use ratatui::Frame;
@@ -32,20 +33,13 @@ pub enum CurveGroup {
 }
 
 impl CurveGroup {
-    /// The other group.
     #[must_use]
     pub fn other(self) -> Self {
-        match self {
-            Self::Gyros => Self::Accelerometers,
-            Self::Accelerometers => Self::Gyros,
-        }
+        if self == Self::Gyros { Self::Accelerometers } else { Self::Gyros }
     }
 
     fn prefix(self) -> &'static str {
-        match self {
-            Self::Gyros => "gyro_",
-            Self::Accelerometers => "accl_",
-        }
+        if self == Self::Gyros { "gyro_" } else { "accl_" }
     }
 }
 
@@ -108,19 +102,12 @@ impl LiveView {
                 table.rows.retain(|row| !row.channel.is_empty());
             }
             for (style, text) in table_lines(&table, index == 0, columns) {
-                let effects = style.get_effects();
-                let mut shown = Style::new();
-                for (effect, modifier) in
-                    [(anstyle::Effects::BOLD, Modifier::BOLD), (anstyle::Effects::DIMMED, Modifier::DIM)]
-                {
-                    if effects.contains(effect) {
-                        shown = shown.add_modifier(modifier);
-                    }
-                }
-                if in_colour && style.get_fg_color().is_some() {
-                    shown = shown.fg(Color::Yellow);
-                }
-                lines.push(Line::styled(text, shown));
+                let with =
+                    |effect, modifier| if style.get_effects().contains(effect) { modifier } else { Modifier::empty() };
+                let bold = with(anstyle::Effects::BOLD, Modifier::BOLD);
+                let shown = Style::new().add_modifier(bold | with(anstyle::Effects::DIMMED, Modifier::DIM));
+                let is_coloured = in_colour && style.get_fg_color().is_some();
+                lines.push(Line::styled(text, if is_coloured { shown.fg(Color::Yellow) } else { shown }));
             }
         }
         lines
@@ -151,10 +138,7 @@ impl LiveView {
             .collect();
         let unit = self.curves.iter().find(|curve| curve.channel.starts_with(group.prefix()));
         let unit = unit.map_or_else(String::new, |curve| crate::rounding::unit(&curve.unit));
-        let name = match group {
-            CurveGroup::Gyros => "gyros",
-            CurveGroup::Accelerometers => "accels",
-        };
+        let name = if group == CurveGroup::Gyros { "gyros" } else { "accels" };
         let block = Block::new().borders(Borders::TOP).title(format!("σ(τ) of the {name}, {unit} over s"));
         let points = || shown.iter().flat_map(|(_, points)| points);
         if points().next().is_none() {
@@ -162,20 +146,18 @@ impl LiveView {
             return;
         }
         let bounds = |of: fn(&(f64, f64)) -> f64| {
-            let (low, high) = points()
-                .map(of)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (value.min(low), value.max(high)));
+            let (low, high) = extremes(points().map(of));
             [low.floor(), high.ceil().max(low.floor() + 1.0)]
         };
         let (x, y) = (bounds(|point| point.0), bounds(|point| point.1));
         let datasets = shown.iter().map(|(axis, points)| {
             let letter = axis.chars().next().unwrap_or('·');
-            let colour = match letter {
-                'x' => Color::Cyan,
-                'y' => Color::Magenta,
-                _ => Color::Green,
+            let style = match letter {
+                _ if !in_colour => Style::new(),
+                'x' => Style::new().fg(Color::Cyan),
+                'y' => Style::new().fg(Color::Magenta),
+                _ => Style::new().fg(Color::Green),
             };
-            let style = if in_colour { Style::new().fg(colour) } else { Style::new() };
             Dataset::default().marker(Marker::Custom(letter)).graph_type(GraphType::Scatter).style(style).data(points)
         });
         let chart = Chart::new(datasets.collect())

@@ -3,7 +3,7 @@
 mod tables;
 
 use crate::coefficient_notes::coefficient_notes;
-use crate::evidence::EvidenceText;
+use crate::evidence;
 use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{self, SENSED, ShownEffect, channel_list, channel_name};
@@ -23,18 +23,13 @@ use noise_analysis::report::{ChannelReport, Finding, Report};
 pub const STYLE: &str = include_str!("page/style.css");
 /// The script of the page, as it stands in its element.
 pub const SCRIPT: &str = include_str!("page/script.js");
+const DEFINITIONS: &str = include_str!("page/definitions.html");
 /// Only the file itself; a figure saved as PNG is an image of its text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
-/// The report on the recording `source` as a page.
+/// The report on the recording `source` as a page, with the record of the reading.
 #[must_use]
-pub fn html(report: &Report, source: Option<&str>) -> String {
-    render(report, source, None, Extent::Whole).into_string()
-}
-
-/// With the record of the reading.
-#[must_use]
-pub fn html_with_reading(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
+pub fn html(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::Whole).into_string()
 }
 
@@ -122,7 +117,7 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
                         (channels(report))
                         (disagreements(report))
                         @if let Some(reading) = reading { (what_was_read(reading)) }
-                        (definitions())
+                        (PreEscaped(DEFINITIONS))
                     }
                 }
                 script { (PreEscaped(SCRIPT)) }
@@ -268,7 +263,7 @@ fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
             details {
                 summary { "Parameters and evidence" }
                 (parameters(report, index))
-                p { (capital(&EvidenceText::of_finding(finding).sentence())) "." }
+                p { (capital(&evidence::of_finding(finding))) "." }
             }
         }
     }
@@ -279,7 +274,7 @@ fn parameters(report: &Report, index: usize) -> Markup {
     html! {
         @for ShownEffect { channel, effect } in &shown {
             p.parameters {
-                @if shown.len() > 1 { span { b { (channel_list(&[(*channel).to_owned()])) } } }
+                @if shown.len() > 1 { span { b { (channel_list([channel])) } } }
                 @for (name, parameter) in &effect.parameters() {
                     span { (parameter_name(name)) " " b { (bounded_quantity(parameter)) } }
                 }
@@ -379,47 +374,6 @@ fn assessment(assessment: &Assessment) -> Markup {
                 }
             }
             @for record in &assessment.record { li { (unparted(&recording_advice(record))) } }
-        }
-    }
-}
-
-fn definitions() -> Markup {
-    html! {
-        section.definitions id="reading" {
-            h2 { "How to read this" }
-            dl {
-                dt { "Intervals" }
-                dd { "have a confidence of 95 %, from the equivalent degrees of freedom (edf) of each point." }
-                dt { "Before, after, model" }
-                dd { "Before is the baseline model: angle random walk " i { "N" } ", bias instability " i { "B" }
-                     ", rate random walk " i { "K" } ". After adds what was found; both are fitted to the first half. The model is "
-                     "that of after, fitted once more to the whole record: the one to use." }
-                dt { "Error" }
-                dd { "With " i { "v" } " the measured and " i { "m" } " the modelled Allan variance, over the "
-                     "octaves with " i { "n" } " ≤ " i { "M" } "/8 of a half: rms is 100·√(mean (½ ln(" i { "v/m" }
-                     "))²) %, deviance a point is mean edf·(ln(" i { "m/v" } ") + " i { "v/m" }
-                     " − 1), which is about 1 for a true model. Beneath is the largest deviation of a point over all "
-                     "averaging times, in standard deviations σ; beyond ±4 σ it is told in words." }
-                dt { "Residual" }
-                dd { "is the cube root of measured over modelled variance less its mean, in standard deviations of each point "
-                     "(Wilson and Hilferty): of a true model 95 % are between −2 and 2." }
-                dt { "Spectrum" }
-                dd { "is the root of the one-sided power spectral density by Welch's method, in bands of equal width on the "
-                     "logarithmic axis; lines that stand out have a point of their own." }
-                dt { "Bias over time" }
-                dd { "is the mean of each block less that of the record. What it follows are steps, ramps, temperature, supply and "
-                     "specific force with the sensitivities that were found." }
-                dt { "By PSD" }
-                dd { "is the deviation by equation (5), σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df, from the measured "
-                     "spectrum instead of differences of means." }
-                dt { "Error after a time" }
-                dd { "is the root mean square of the integral over that time, of a vehicle that took the mean of the 60 s "
-                     "before as its bias: an angle of a gyro, a velocity of an accelerometer." }
-                dt { "Continuous and discrete" }
-                dd { "coefficients belong to the process and to its samples at this rate: they are different numbers." }
-                dt { "Data sheet" }
-                dd { "values are typical. Its in-run bias stability is the minimum of the curve; " i { "B" } " is that over 0.664." }
-            }
         }
     }
 }

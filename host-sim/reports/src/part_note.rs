@@ -26,7 +26,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
                 .to_owned()
         }
         PartNote::Minority(channels) => {
-            let each: Vec<String> = channels.iter().map(|channel| names(&[channel])).collect();
+            let each: Vec<String> = channels.iter().map(|channel| channel_list([channel])).collect();
             format!(
                 "Only {} {} correlated as behind a low-pass filter; most channels are not, so it is not the part's own filter.",
                 enumerated(&each),
@@ -50,7 +50,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
             estimate(sample_rate_hz.value, sample_rate_hz.low, sample_rate_hz.high)
         ),
         PartNote::LengthAlone { length, taps, other_taps, nominal_hz } => format!(
-            "The curves give the length of the filter, {} samples, and not its taps. {taps} taps are nearest to the nominal clock of {} \
+            "The spectra give the length of the filter, {} samples, and not its taps. {taps} taps are nearest to the nominal clock of {} \
              Hz; {} taps at another clock have the same length.",
             significant(*length, 3),
             plain(*nominal_hz, 4),
@@ -58,7 +58,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
         ),
         PartNote::Contradicted { channel, decimation } => format!(
             "{} alone would have its filter read every {} values, farther from the common figure than chance explains.",
-            capital(&names(&[*channel])),
+            capital(&channel_list([channel])),
             significant(*decimation, 4)
         ),
         PartNote::NotInAll { showing, able } => {
@@ -87,8 +87,4 @@ pub(crate) fn in_short(notes: &[PartNote]) -> Vec<String> {
         | PartNote::NotInAll { .. } => None,
     };
     notes.iter().filter_map(of).collect()
-}
-
-fn names(channels: &[&str]) -> String {
-    channel_list(&channels.iter().map(|&name| name.to_owned()).collect::<Vec<_>>())
 }

@@ -10,6 +10,11 @@ const SYMMETRIC: f64 = 0.25;
 /// Largest ratio of both sides of such an interval.
 const SKEW: f64 = 1.3;
 
+/// The least and the largest; infinite without any.
+pub(crate) fn extremes(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), of| (of.min(low), of.max(high)))
+}
+
 /// As printed: `deg/sqrt(s)` becomes `°/√s`.
 pub fn unit(name: &str) -> String {
     let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
@@ -25,14 +30,14 @@ fn fixed(value: f64, decimals: usize) -> String {
     if whole.bytes().chain(fraction.into_iter().flat_map(str::bytes)).all(|digit| digit == b'0') {
         return fraction.map_or_else(|| "0".to_owned(), |fraction| format!("0.{fraction}"));
     }
-    let mut grouped = String::new();
-    for (index, digit) in whole.chars().enumerate() {
-        if index > 0 && (whole.len() - index).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    fraction.map_or_else(|| format!("{sign}{grouped}"), |fraction| format!("{sign}{grouped}.{fraction}"))
+    let whole = grouped(whole);
+    fraction.map_or_else(|| format!("{sign}{whole}"), |fraction| format!("{sign}{whole}.{fraction}"))
+}
+
+/// Thousands separated by commas.
+pub(crate) fn grouped(digits: &str) -> String {
+    let is_start = |at: usize| at > 0 && (digits.len() - at).is_multiple_of(3);
+    digits.char_indices().flat_map(|(at, digit)| is_start(at).then_some(',').into_iter().chain([digit])).collect()
 }
 
 /// Decimals for an uncertainty: two digits if it begins with 1 or 2, else one.

@@ -1,9 +1,9 @@
 //! A report as rows of a flat table: the recording, coefficients by channel, and parameters by finding and channel.
 
-use crate::coefficients::SLOPES;
+use crate::coefficients::KINDS;
 use crate::finding_text::shown_effects;
 use crate::reading::ReadingRecord;
-use crate::saved_report::{SavedChannel, SavedParameter};
+use crate::summary::coefficient;
 use noise_analysis::report::{Finding, Parameter, Report, Validation};
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +31,6 @@ pub struct ReportRow {
     pub kind: Option<String>,
     /// Such as `frequency`.
     pub parameter: Option<String>,
-    /// In `unit`.
     pub value: Option<f64>,
     /// Lower 95 % bound.
     pub low: Option<f64>,
@@ -85,16 +84,15 @@ pub fn rows(report: &Report, recording: &str, reading: Option<&ReadingRecord>) -
     };
     let mut rows = vec![of_recording.clone()];
     for channel in &report.channels {
-        let saved = SavedChannel::from(channel);
-        for kind in SLOPES.iter().map(|(kind, ..)| *kind).chain(["quantization", "rate_ramp"]) {
-            let Some(SavedParameter { value, low, high, unit }) = saved.coefficient(kind) else { continue };
+        for kind in KINDS.into_iter().chain(["quantization", "rate_ramp"]) {
+            let Some(of) = coefficient(channel, kind) else { continue };
             let row = ReportRow {
                 row: "coefficient".to_owned(),
                 channel: Some(channel.name.clone()),
                 kind: Some(kind.to_owned()),
                 ..of_recording.clone()
             };
-            rows.push(row.with_value(Parameter { value, low, high, unit }));
+            rows.push(row.with_value(of));
         }
     }
     for (index, Finding { effect, channels, validated, .. }) in report.findings.iter().enumerate() {

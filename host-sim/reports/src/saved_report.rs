@@ -1,8 +1,7 @@
 //! The part of a report that other programs need: sample rate, curves, final models; from JSON (schema 2) or memory.
 
-use crate::coefficients::{self, SLOPES};
-use noise_analysis::bounds::BoundedEstimate;
-use noise_analysis::report::{ChannelReport, DataSheetReport, Parameter, Report, SCHEMA, TermReport};
+use crate::coefficients::{KINDS, white_noise};
+use noise_analysis::report::{ChannelReport, CurvePoint, DataSheetReport, ModelReport, Parameter, Report, SCHEMA};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 
@@ -28,7 +27,7 @@ pub struct SavedChannel {
     /// Unit of the deviations, such as `deg/s`.
     pub unit: String,
     /// The measured Allan deviation, octave by octave.
-    pub curve: Vec<SavedPoint>,
+    pub curve: Vec<CurvePoint>,
     /// Fitted to the whole record.
     #[serde(rename = "final")]
     pub refitted: SavedModel,
@@ -39,25 +38,6 @@ pub struct SavedChannel {
     pub data_sheet: Option<DataSheetReport>,
 }
 
-/// One octave of the measured Allan deviation, with 95 % bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct SavedPoint {
-    /// Averaging factor, samples.
-    pub n: u64,
-    /// Averaging time, s.
-    pub tau_s: f64,
-    /// In the channel's unit.
-    pub adev: f64,
-    /// Lower bound of `adev`.
-    pub low: f64,
-    /// Upper bound of `adev`; infinite if unknown.
-    #[serde(deserialize_with = "unbounded")]
-    pub high: f64,
-    /// Equivalent degrees of freedom.
-    pub edf: f64,
-}
-
-/// A fitted model.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedModel {
     pub terms: Vec<SavedTerm>,
@@ -65,24 +45,12 @@ pub struct SavedModel {
     pub adev: Vec<f64>,
 }
 
-/// One term of a model.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedTerm {
     /// Such as `angle_random_walk`.
     pub kind: String,
-    /// By name, as in [`TermReport::parameters`].
-    pub parameters: BTreeMap<String, SavedParameter>,
-}
-
-/// An estimate with its 95 % bounds.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct SavedParameter {
-    pub value: f64,
-    pub low: f64,
-    /// Upper bound; infinite if unknown.
-    #[serde(deserialize_with = "unbounded")]
-    pub high: f64,
-    pub unit: String,
+    /// By name, as in [`noise_analysis::report::TermReport::parameters`].
+    pub parameters: BTreeMap<String, Parameter>,
 }
 
 /// Reasons to refuse a file.
@@ -110,21 +78,9 @@ fn is_same_rate(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() < 0.01
 }
 
-/// JSON has `null` for infinity.
-fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
-}
-
 fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    #[derive(Deserialize)]
-    struct Error {
-        deviance_per_point: Option<f64>,
-    }
-    #[derive(Deserialize)]
-    struct Model {
-        unseen: Error,
-    }
-    Ok(Option::<Model>::deserialize(deserializer)?.and_then(|model| model.unseen.deviance_per_point))
+    let model = serde_json::Value::deserialize(deserializer)?;
+    Ok(model.pointer("/unseen/deviance_per_point").and_then(serde_json::Value::as_f64))
 }
 
 impl SavedReport {
@@ -164,7 +120,7 @@ impl SavedReport {
                 return contradiction(format!("the channel {} is there twice", channel.name));
             }
             for term in &channel.refitted.terms {
-                let Some(SavedParameter { value, low, high, .. }) = term.parameters.get("value") else { continue };
+                let Some(Parameter { value, low, high, .. }) = term.parameters.get("value") else { continue };
                 let is_number = |of: &f64| *of == 0.0 || of.is_normal() || *of == f64::INFINITY;
                 let are_numbers = [value, low, high].into_iter().all(is_number);
                 // Rounding.
@@ -198,7 +154,6 @@ impl SavedReport {
         Ok(joined)
     }
 
-    /// The channel of this name.
     #[must_use]
     pub fn channel(&self, name: &str) -> Option<&SavedChannel> {
         self.channels.iter().find(|channel| channel.name == name)
@@ -208,22 +163,18 @@ impl SavedReport {
 impl SavedChannel {
     /// The coefficient of the term `kind`; N of all white noise, also below the corner of a process that replaces it.
     #[must_use]
-    pub fn coefficient(&self, kind: &str) -> Option<SavedParameter> {
-        if kind != SLOPES[0].0 {
-            return self.refitted.terms.iter().find(|term| term.kind == kind)?.parameters.get("value").cloned();
+    pub fn coefficient(&self, kind: &str) -> Option<Parameter> {
+        let mut terms = self.refitted.terms.iter();
+        if kind == KINDS[0] {
+            return white_noise(terms.filter_map(SavedTerm::angle_random_walk).cloned());
         }
-        let white = self.refitted.terms.iter().filter_map(SavedTerm::angle_random_walk);
-        let white = white.map(|SavedParameter { value, low, high, unit }| {
-            (BoundedEstimate { value: *value, low: *low, high: *high }, unit.clone())
-        });
-        let (BoundedEstimate { value, low, high }, unit) = coefficients::white_noise(white)?;
-        Some(SavedParameter { value, low, high, unit })
+        terms.find(|term| term.kind == kind)?.parameters.get("value").cloned()
     }
 }
 
 impl SavedTerm {
     /// N of white noise, filtered or not.
-    fn angle_random_walk(&self) -> Option<&SavedParameter> {
+    fn angle_random_walk(&self) -> Option<&Parameter> {
         let is_white = ["angle_random_walk", "filter_bandwidth", "low_pass"].contains(&self.kind.as_str());
         self.parameters.get(if is_white { "value" } else { BELOW_CORNER })
     }
@@ -245,33 +196,25 @@ impl From<&Report> for SavedReport {
 
 impl From<&ChannelReport> for SavedChannel {
     fn from(channel: &ChannelReport) -> Self {
-        let parameter = |(name, of): (&str, Parameter)| {
-            let Parameter { value, low, high, unit } = of;
-            (name.to_owned(), SavedParameter { value, low, high, unit })
-        };
-        let term = |term: &TermReport| SavedTerm {
-            kind: term.kind().to_owned(),
-            parameters: term.parameters().into_iter().map(parameter).collect(),
-        };
-        let point = |point: &noise_analysis::report::CurvePoint| SavedPoint {
-            n: point.n,
-            tau_s: point.tau_s,
-            adev: point.adev,
-            low: point.low,
-            high: point.high,
-            edf: point.edf,
-        };
         Self {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
-            curve: channel.curve.iter().map(point).collect(),
-            refitted: SavedModel {
-                terms: channel.refitted.terms.iter().map(term).collect(),
-                adev: channel.refitted.adev.clone(),
-            },
+            curve: channel.curve.clone(),
+            refitted: SavedModel::from(&channel.refitted),
             unseen_error: channel.after.unseen.deviance_per_point,
             data_sheet: channel.figure_data.data_sheet.clone(),
         }
+    }
+}
+
+impl From<&ModelReport> for SavedModel {
+    fn from(model: &ModelReport) -> Self {
+        let parameters = |(name, of): (&str, Parameter)| (name.to_owned(), of);
+        let terms = model.terms.iter().map(|term| SavedTerm {
+            kind: term.kind().to_owned(),
+            parameters: term.parameters().into_iter().map(parameters).collect(),
+        });
+        Self { terms: terms.collect(), adev: model.adev.clone() }
     }
 }
 

@@ -1,8 +1,7 @@
 //! Several recordings of one sensor: agreement, and inflation while a machine runs.
 
-use crate::formatting::number;
+use crate::formatting::{number, plain_table};
 use crate::rounding::probability;
-use comfy_table::{Table, presets};
 use noise_analysis::report::several::{NoiseAgreement, NoiseInflation};
 use std::io::{self, Write};
 
@@ -16,7 +15,7 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
         samples.join(", "),
         agreement.sample_rate_hz
     )?;
-    let mut table = table(["channel", "noise", "p", "largest ratio", "joint model"]);
+    let mut table = plain_table(["channel", "noise", "p", "largest ratio", "joint model"]);
     for channel in &agreement.channels {
         let ratios = channel.octaves.iter().map(|octave| {
             let (low, high) =
@@ -51,7 +50,7 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
 /// One row per channel and octave.
 pub fn write_inflation(inflation: &NoiseInflation, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "\ninflation: Allan deviation while running over that at rest, with 95 % bounds")?;
-    let mut table = table(["channel", "averaging time", "at rest", "running", "unit", "factor"]);
+    let mut table = plain_table(["channel", "averaging time", "at rest", "running", "unit", "factor"]);
     for channel in &inflation.channels {
         for octave in &channel.octaves {
             table.add_row([
@@ -65,10 +64,4 @@ pub fn write_inflation(inflation: &NoiseInflation, out: &mut impl Write) -> io::
         }
     }
     writeln!(out, "{table}")
-}
-
-fn table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(header);
-    table
 }

@@ -1,21 +1,22 @@
 //! The summary of a report: trust, coefficients, contradictions, next steps.
 
-use crate::coefficients;
+use crate::coefficients::{KINDS, LETTERS, white_noise};
 use crate::finding_text::{
-    ALL_CHANNELS, FindingText, SENSED, channel_list, departure, describe, largest, shown_effects,
+    ALL_CHANNELS, FindingText, SENSED, channel_list, channel_name, departure, describe, excess_percent, largest,
+    shown_effects,
 };
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{
-    NONE, column_prefix, estimate, is_upper_bound, parameter_magnitude, plain, quantity, significant, span, unit,
+    NONE, column_prefix, estimate, extremes, is_upper_bound, parameter_magnitude, plain, quantity, significant, span,
+    unit,
 };
-use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::distributions::quantile;
 use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::assessment::Innovations;
 use noise_analysis::report::{
-    BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report, Stretch,
+    BiasOverTime, ChannelReport, Finding, ModelErrorReport, ModelReport, Parameter, PartNote, Report, Stretch,
 };
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
@@ -34,9 +35,6 @@ const THROUGHOUT: f64 = 0.999;
 /// Minimum of the Allan deviation over B: `sqrt(2 ln 2/π)`.
 const MINIMUM_OVER_B: f64 = 0.664;
 
-/// Kind, letter and name of the baseline coefficients.
-const LETTERS: [(&str, &str); 3] = [("angle_random_walk", "N"), ("bias_instability", "B"), ("rate_random_walk", "K")];
-
 /// A group of inertial channels with their units.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CoefficientTable {
@@ -49,7 +47,6 @@ pub struct CoefficientTable {
     pub rows: Vec<CoefficientTableRow>,
 }
 
-/// The row of one channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CoefficientTableRow {
     /// The axis, or `sheet`.
@@ -90,7 +87,6 @@ const GROUPS: [Group; 2] = [
 pub struct ChannelCoefficients {
     /// Such as `gyro_z`.
     pub name: String,
-    /// Such as `deg/s`.
     pub unit: String,
     /// N, B and K; absent ones are `None`.
     pub coefficients: [Option<Parameter>; 3],
@@ -105,8 +101,8 @@ impl ChannelCoefficients {
         Self {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
-            coefficients: LETTERS.map(|(kind, _)| coefficient(channel, kind)),
-            rms_percent: [&channel.before, &channel.after].map(|model| model.unseen.rms_percent),
+            coefficients: KINDS.map(|kind| coefficient(channel, kind)),
+            rms_percent: models(channel).map(|model| model.unseen.rms_percent),
             deviance: channel.after.unseen.deviance_per_point,
         }
     }
@@ -128,7 +124,7 @@ pub(crate) fn coefficients_in_short(report: &Report, channel: &str) -> [String; 
     let tables = coefficient_tables(report);
     let row = tables.iter().find_map(|table| Some((table, table.rows.iter().find(|row| row.channel == channel)?)));
     std::array::from_fn(|index| {
-        let letter = LETTERS[index].1;
+        let letter = LETTERS[index];
         let number = row.and_then(|(table, row)| {
             let number = row.coefficients[index].split(' ').next()?;
             number
@@ -155,26 +151,24 @@ fn tables_of(
         let channels: Vec<&ChannelCoefficients> =
             all.iter().filter(|channel| channel.name.starts_with(prefix)).collect();
         let first = channels.first()?;
-        let factor = |index: usize| {
-            let known = conversions(LETTERS[index].0, &first.unit, sample_rate_hz);
-            known.iter().find(|known| known.unit == units[index].1).map_or(1.0, |known| known.factor) * units[index].2
-        };
-        let factors: [f64; 3] = std::array::from_fn(factor);
-        let prefixes: [(&str, f64); 3] = std::array::from_fn(|index| {
+        // Prefix, and factor to the unit with it.
+        let columns: [(&str, f64); 3] = std::array::from_fn(|index| {
+            let known = conversions(KINDS[index], &first.unit, sample_rate_hz);
+            let (_, name, symbols) = units[index];
+            let factor = known.iter().find(|known| known.unit == name).map_or(1.0, |known| known.factor) * symbols;
             let shown = channels.iter().filter_map(|channel| channel.coefficients[index].as_ref());
-            column_prefix(shown.map(|n| factors[index] * parameter_magnitude(n)))
+            let (prefix, divisor) = column_prefix(shown.map(|n| factor * parameter_magnitude(n)));
+            (prefix, factor / divisor)
         });
-        let scale = |index: usize| factors[index] / prefixes[index].1;
         let mut rows: Vec<CoefficientTableRow> = channels
             .iter()
             .map(|channel| CoefficientTableRow {
                 label: channel.name.trim_start_matches(prefix).to_owned(),
                 channel: channel.name.clone(),
                 coefficients: std::array::from_fn(|index| {
-                    channel.coefficients[index].as_ref().map_or_else(
-                        || "–".to_owned(),
-                        |n| estimate(n.value * scale(index), n.low * scale(index), n.high * scale(index)),
-                    )
+                    let scale = columns[index].1;
+                    let shown = |n: &Parameter| estimate(n.value * scale, n.low * scale, n.high * scale);
+                    channel.coefficients[index].as_ref().map_or_else(|| NONE.to_owned(), shown)
                 }),
                 error: error_change(channel.rms_percent),
                 is_high: channel.deviance.is_some_and(|of| of > HIGH_DEVIANCE),
@@ -184,18 +178,18 @@ fn tables_of(
             label: "sheet".to_owned(),
             channel: String::new(),
             coefficients: std::array::from_fn(|index| {
-                let number = |value: f64| significant(value * scale(index), 2);
+                let number = |value: f64| significant(value * columns[index].1, 2);
                 match sheet[index] {
                     Some(value) if index == 1 => {
                         format!("{} = {}/{MINIMUM_OVER_B}", number(value), number(value * MINIMUM_OVER_B))
                     }
-                    value => value.map_or_else(|| "–".to_owned(), number),
+                    value => value.map_or_else(|| NONE.to_owned(), number),
                 }
             }),
             error: String::new(),
             is_high: false,
         }));
-        let units = std::array::from_fn(|index| format!("{}{}", prefixes[index].0, units[index].0));
+        let units = std::array::from_fn(|index| format!("{}{}", columns[index].0, units[index].0));
         Some(CoefficientTable { title, names: *names, units, rows })
     };
     GROUPS.iter().filter_map(table).collect()
@@ -214,19 +208,17 @@ pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
 /// A coefficient of the model to use; N of all white noise, also below the corner of a process that replaces it.
 #[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
-    let terms = || channel.refitted.terms.iter();
-    if kind != LETTERS[0].0 {
-        return terms().find(|term| term.kind() == kind).map(TermReport::coefficient);
+    let mut terms = channel.refitted.terms.iter();
+    if kind == KINDS[0] {
+        return white_noise(terms.filter_map(TermReport::angle_random_walk));
     }
-    let white = terms().filter_map(TermReport::angle_random_walk);
-    let white = white.map(|Parameter { value, low, high, unit }| (BoundedEstimate { value, low, high }, unit));
-    let (BoundedEstimate { value, low, high }, unit) = coefficients::white_noise(white)?;
-    Some(Parameter::new(value, low, high, unit))
+    terms.find(|term| term.kind() == kind).map(TermReport::coefficient)
 }
 
-/// For the models `before` and `after` on the unseen half as recorded.
-pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
-    [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point)
+/// The models of the first half without and with the findings: twice the same one for a channel without a finding, even if its first half alone
+/// has shown an effect.
+pub(crate) fn models(channel: &ChannelReport) -> [&ModelReport; 2] {
+    [if channel.effects.is_empty() { &channel.after } else { &channel.before }, &channel.after]
 }
 
 /// Error of σ before and after; empty without unseen data.
@@ -239,7 +231,6 @@ fn error_change(rms_percent: [Option<f64>; 2]) -> String {
     }
 }
 
-/// Largest percentage that is told.
 const MOST_PERCENT: f64 = 1000.0;
 
 /// Error of σ by the rms logarithm of its ratio: a factor of 2 is 100 %.
@@ -313,26 +304,24 @@ const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, 
 /// The sentence for no finding, with its channels.
 #[must_use]
 pub fn nothing_found(report: &Report) -> String {
-    let sensed = || report.channels.iter().filter(|channel| is_sensed(channel) && !is_constant(channel));
-    let named = |channels: Vec<&ChannelReport>| match channel_list(
-        &channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>(),
-    ) {
+    let sensed = report.channels.iter().filter(|channel| is_sensed(channel) && !is_constant(channel));
+    let (failing, described): (Vec<&ChannelReport>, Vec<&ChannelReport>) = sensed.partition(|channel| is_high(channel));
+    let named = |channels: &[&ChannelReport]| match channel_list(channels.iter().map(|channel| &channel.name)) {
         all if all == ALL_CHANNELS => "gyros and accelerometers".to_owned(),
         names => names,
     };
-    let failing: Vec<&ChannelReport> = sensed().filter(|channel| is_high(channel)).collect();
-    let described: Vec<&ChannelReport> = sensed().filter(|channel| !is_high(channel)).collect();
-    if !failing.is_empty() || !contradictions(report).is_empty() {
-        let names = if failing.is_empty() { format!("all of {}", named(described)) } else { named(failing) };
-        format!("Nothing with a name, but N, B and K do not describe {names}.")
+    if !failing.is_empty() {
+        format!("Nothing with a name, but N, B and K do not describe {}.", named(&failing))
+    } else if !contradictions(report).is_empty() {
+        format!("Nothing with a name, but N, B and K do not describe all of {}.", named(&described))
     } else if is_short(report) {
         "Nothing: a record as short as this one shows strong effects only.".to_owned()
     } else if described.is_empty() {
         "Nothing.".to_owned()
-    } else if report.quick {
-        format!("Nothing in the curves: N, B and K describe those of {}.", named(described))
     } else {
-        format!("Nothing: N, B and K describe {}.", named(described))
+        let within = if report.quick { " in the curves" } else { "" };
+        let of = if report.quick { "those of " } else { "" };
+        format!("Nothing{within}: N, B and K describe {of}{}.", named(&described))
     }
 }
 
@@ -388,7 +377,7 @@ fn trust(report: &Report) -> String {
 fn unseen_half(report: &Report) -> Option<String> {
     let range = |of: &dyn Fn(&ChannelReport) -> Option<f64>| {
         let each: Vec<f64> = inertial(report).filter_map(of).collect();
-        let (low, high) = each.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &of| (low.min(of), high.max(of)));
+        let (low, high) = extremes(each.iter().copied());
         let [low, high] = [low, high].map(off_percent);
         let range = if low == high { high } else { format!("{low} to {high}") };
         (!each.is_empty()).then(|| format!("{range} %"))
@@ -396,9 +385,14 @@ fn unseen_half(report: &Report) -> Option<String> {
     let with = range(&|channel| channel.after.unseen.rms_percent)?;
     let halves = range(&|channel| channel.first_half_curve.rms_percent)
         .map_or_else(String::new, |halves| format!(" (the two halves differ by {halves})"));
-    let is_changed = inertial(report).any(|channel| channel.before.unseen != channel.after.unseen);
-    let without = range(&|channel| channel.before.unseen.rms_percent).filter(|_| is_changed);
-    let without = without.map_or_else(String::new, |without| format!("; without what was found, by {without}"));
+    let is_changed = |channel: &ChannelReport| {
+        let [without, with] = models(channel);
+        without.unseen != with.unseen
+    };
+    let changed = inertial_names(report, is_changed);
+    let without = range(&|channel| channel.before.unseen.rms_percent.filter(|_| is_changed(channel))).zip(changed);
+    let without =
+        without.map_or_else(String::new, |(range, names)| format!("; without what was found in {names}, by {range}"));
     Some(format!("On the second half, which the model had not seen, σ is off by {with}{halves}{without}."))
 }
 
@@ -432,6 +426,9 @@ pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
 
 struct Departure<'a> {
     of: &'a Unexplained,
+    /// In words, without its size.
+    place: String,
+    is_above: Option<bool>,
     channels: Vec<String>,
     excesses: Vec<f64>,
 }
@@ -451,38 +448,28 @@ fn departures(report: &Report) -> Vec<Departure<'_>> {
     let mut departures: Vec<Departure<'_>> = Vec::new();
     for (number, finding) in report.findings.iter().enumerate() {
         let Effect::Unexplained(of) = &finding.effect else { continue };
-        let excess = of.excess_percent.map(|of| of.value);
-        // Each channel's own excess.
-        let own = shown_effects(report, number).into_iter().filter_map(|shown| match shown.effect {
-            Effect::Unexplained(of) => Some(of.excess_percent?.value),
-            _ => None,
-        });
-        let mut excesses: Vec<f64> = own.collect();
+        let mut excesses = excess_percent(&shown_effects(report, number));
         if excesses.is_empty() {
-            excesses.extend(excess);
+            excesses.extend(of.excess_percent.map(|of| of.value));
         }
-        let is_same_side = |of: &Departure<'_>| match (of.excesses.first(), excess) {
-            (Some(first), Some(excess)) => first.signum() == excess.signum(),
-            (first, excess) => first.is_none() && excess.is_none(),
-        };
-        let is_same_place = |known: &Departure<'_>| departure(known.of, &[]) == departure(of, &[]);
+        let (place, is_above) = (departure(of, &[]), of.excess_percent.map(|of| of.value >= 0.0));
+        let is_same = |of: &Departure<'_>| of.place == place && of.is_above == is_above;
         let is_told = |of: &Departure<'_>| finding.channels.iter().all(|name| of.channels.contains(name));
-        if departures.iter().any(|of| is_same_place(of) && is_same_side(of) && is_told(of)) {
+        if departures.iter().any(|of| is_same(of) && is_told(of)) {
             continue;
         }
-        let of_other_channels = |of: &Departure<'_>| finding.channels.iter().all(|name| !of.channels.contains(name));
-        match departures.iter_mut().find(|of| is_same_place(of) && is_same_side(of) && of_other_channels(of)) {
-            Some(departure) => {
-                departure.channels.extend(finding.channels.iter().cloned());
-                departure.excesses.extend(excesses);
+        let is_of_others = |of: &Departure<'_>| finding.channels.iter().all(|name| !of.channels.contains(name));
+        match departures.iter_mut().find(|of| is_same(of) && is_of_others(of)) {
+            Some(known) => {
+                known.channels.extend(finding.channels.iter().cloned());
+                known.excesses.extend(excesses);
             }
-            None => departures.push(Departure { of, channels: finding.channels.clone(), excesses }),
+            None => departures.push(Departure { of, place, is_above, channels: finding.channels.clone(), excesses }),
         }
     }
     departures
 }
 
-/// One text per departure.
 #[must_use]
 pub fn unexplained(report: &Report) -> Vec<String> {
     departures(report).iter().map(Departure::text).collect()
@@ -578,8 +565,8 @@ fn missing_values(report: &Report) -> String {
     let with_missing: Vec<&ChannelReport> = report.channels.iter().filter(|channel| missing(channel) > 0).collect();
     let Some(most) = with_missing.iter().map(|channel| missing(channel)).max() else { return String::new() };
     let up_to = if with_missing.iter().all(|channel| missing(channel) == most) { "" } else { "up to " };
-    let names: Vec<String> = with_missing.iter().map(|channel| channel.name.clone()).collect();
-    format!(", {up_to}{} values missing in {}", count(most), channel_list(&names))
+    let names = channel_list(with_missing.iter().map(|channel| &channel.name));
+    format!(", {up_to}{} values missing in {names}", count(most))
 }
 
 /// Largest relative half-width called ±20 %.
@@ -622,9 +609,7 @@ const SHORT_S: f64 = 600.0;
 /// Too short: most channels have only limits for B and K.
 fn is_short(report: &Report) -> bool {
     let shows = |channel: &ChannelReport| {
-        let of =
-            |(kind, _): &(&str, &str)| coefficient(channel, kind).is_some_and(|of| !is_upper_bound(of.value, of.low));
-        LETTERS[1..].iter().any(of)
+        KINDS[1..].iter().filter_map(|kind| coefficient(channel, kind)).any(|of| !is_upper_bound(of.value, of.low))
     };
     report_length_s(report) < SHORT_S && {
         let (showing, all) = (inertial(report).filter(|channel| shows(channel)).count(), inertial(report).count());
@@ -635,7 +620,7 @@ fn is_short(report: &Report) -> bool {
 fn use_of_short_record(report: &Report) -> String {
     let length = span(report_length_s(report));
     let is_known = |(_, n): &(String, Parameter)| !is_upper_bound(n.value, n.low) && relative_error(n).is_finite();
-    let all = inertial(report).filter_map(|channel| Some((channel.name.clone(), coefficient(channel, LETTERS[0].0)?)));
+    let all = inertial(report).filter_map(|channel| Some((channel.name.clone(), coefficient(channel, KINDS[0])?)));
     let (known, bounded): (Vec<_>, Vec<_>) = all.partition(is_known);
     if known.is_empty() {
         return format!("{length}: too short for N, B, K and a filter.");
@@ -666,7 +651,7 @@ fn length_advice(report: &Report) -> LengthAdvice {
     }
     let (mut known, mut except, mut longer, mut much_longer) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut bounded, mut in_some) = (Vec::new(), Vec::new());
-    for (kind, letter) in LETTERS {
+    for (kind, letter) in KINDS.into_iter().zip(LETTERS) {
         let all = knowledge(report, kind);
         let named = |is_one: &dyn Fn(&Knowledge) -> bool| -> Vec<String> {
             all.iter().filter(|(_, of)| is_one(of)).map(|(name, _)| name.clone()).collect()
@@ -708,24 +693,26 @@ fn length_advice(report: &Report) -> LengthAdvice {
     LengthAdvice { known, except, longer, limits }
 }
 
+/// The inertial channels that are so, in few words; `None` without any.
+fn inertial_names(report: &Report, is_so: impl Fn(&ChannelReport) -> bool) -> Option<String> {
+    let names: Vec<&String> = inertial(report).filter(|channel| is_so(channel)).map(|channel| &channel.name).collect();
+    (!names.is_empty()).then(|| channel_list(names))
+}
+
 /// Channels fitted to the later quarter; `None` without any.
 fn recent_fit(report: &Report) -> Option<String> {
-    let recent: Vec<String> =
-        inertial(report).filter(|channel| is_fitted_to_later_quarter(channel)).map(|of| of.name.clone()).collect();
-    (!recent.is_empty()).then(|| {
-        format!(
-            "Because the noise changed, the model of {} was fitted to the last quarter before the second half alone.",
-            channel_list(&recent)
-        )
-    })
+    let recent = inertial_names(report, is_fitted_to_later_quarter)?;
+    Some(format!(
+        "Because the noise changed, the model of {recent} was fitted to the last quarter before the second half alone."
+    ))
 }
 
 /// `None` without spikes and knocks.
 fn without_events(report: &Report) -> Option<String> {
     let excluding = inertial(report).filter_map(|channel| {
-        let [before, after] = [&channel.before, &channel.after].map(|model| model.unseen_excluding.as_ref());
+        let [before, after] = models(channel).map(|model| model.unseen_excluding.as_ref());
         let change = error_change([before?, after?].map(|error| error.rms_percent));
-        Some(format!("{} {change}", channel_list(std::slice::from_ref(&channel.name))))
+        Some(format!("{} {change}", channel_name(channel)))
     });
     let excluding: Vec<String> = excluding.collect();
     (!excluding.is_empty()).then(|| format!("Without spikes and knocks σ is off by: {}.", excluding.join(", ")))
@@ -752,10 +739,7 @@ pub fn conditions(report: &Report) -> Vec<String> {
     let moved = |name: &str, label: &str| {
         let channel = report.channels.iter().find(|channel| channel.name == name)?;
         let bias = channel.figure_data.bias_over_time.as_ref()?;
-        let (low, high) = bias
-            .mean
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| (value.min(low), value.max(high)));
+        let (low, high) = extremes(bias.mean.iter().copied());
         let range = high - low;
         Some(if is_constant(channel) || range == 0.0 {
             format!("{label} did not change")
@@ -779,7 +763,7 @@ fn is_constant(channel: &ChannelReport) -> bool {
 
 /// Range of block means that white noise exceeds in fewer than [`CHANCE`] of all records; 0 without N.
 fn range_of_white_noise(channel: &ChannelReport, bias: &BiasOverTime) -> f64 {
-    let deviation = coefficient(channel, LETTERS[0].0).map_or(0.0, |n| n.high / bias.block_s.sqrt());
+    let deviation = coefficient(channel, KINDS[0]).map_or(0.0, |n| n.high / bias.block_s.sqrt());
     // Highest and lowest mean, half each.
     2.0 * quantile(CHANCE / 2.0 / bias.mean.len().max(1) as f64) * deviation
 }
@@ -790,9 +774,9 @@ fn magnetometers(report: &Report) -> Vec<String> {
     let (failed, described): (Vec<&ChannelReport>, Vec<&ChannelReport>) = all.partition(|channel| is_high(channel));
     let label = |channels: &[&ChannelReport]| match channels.len() {
         3 => "magnetometers".to_owned(),
-        _ => channel_list(&channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>()),
+        _ => channel_list(channels.iter().map(|channel| &channel.name)),
     };
-    let noise: Vec<Parameter> = described.iter().filter_map(|of| coefficient(of, LETTERS[0].0)).collect();
+    let noise: Vec<Parameter> = described.iter().filter_map(|of| coefficient(of, KINDS[0])).collect();
     let mut told = Vec::new();
     if let Some(first) = noise.first() {
         let (prefix, factor) = column_prefix(noise.iter().map(parameter_magnitude));
@@ -867,7 +851,7 @@ fn related_line(report: &Report, finding: &Finding) -> Option<String> {
         let followed = related.line_hz.iter().sum::<f64>() / related.line_hz.len().max(1) as f64;
         ((frequency / followed - 1.0).abs() < SAME_LINE).then_some(related)
     })?;
-    let other = channel_list(std::slice::from_ref(&of.channel));
+    let other = channel_list([&of.channel]);
     let at = match of.ratio {
         (1, 1) => "at the same frequency".to_owned(),
         (above, below) => format!("at {above}/{below} of the frequency"),
@@ -878,48 +862,32 @@ fn related_line(report: &Report, finding: &Finding) -> Option<String> {
 /// One text each, the most serious first.
 #[must_use]
 pub fn contradictions(report: &Report) -> Vec<String> {
-    let mut told = Vec::new();
     let channels = inertial(report).count() as f64;
     let is_far_off = |channel: &ChannelReport, sigma: f64| {
         let fitted = if is_fitted_to_later_quarter(channel) { FITTED_TO_QUARTER } else { FITTED_TO_HALF };
         let octaves = channel.curve.len() as f64;
-        sigma.abs() > (1.0 + fitted).sqrt() * quantile(CHANCE / 2.0 / (channels * octaves).max(1.0))
+        sigma > (1.0 + fitted).sqrt() * quantile(CHANCE / 2.0 / (channels * octaves).max(1.0))
     };
-    let mut far: Vec<(&ChannelReport, &ModelErrorReport, f64)> = inertial(report)
-        .filter_map(|channel| {
-            let error = &channel.after.unseen;
-            let sigma = error.worst_sigma.filter(|&sigma| is_far_off(channel, sigma))?;
-            Some((channel, error, sigma))
-        })
-        .collect();
-    far.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    for (channel, error, sigma) in &far {
-        let (Some(tau), Some(ratio)) = (error.worst_tau_s, error.worst_ratio) else { continue };
-        let change = 100.0 * (1.0 / ratio - 1.0);
+    let far = |channel: &ChannelReport| {
+        let ModelErrorReport { worst_sigma, worst_tau_s, worst_ratio, .. } = channel.after.unseen;
+        let sigma = worst_sigma.map(f64::abs).filter(|&sigma| is_far_off(channel, sigma))?;
+        let (tau, times) = (span(worst_tau_s?), 1.0 / worst_ratio?);
+        let change = 100.0 * (times - 1.0);
         let size = if change.abs() < 100.0 {
             format!("{} % {}", significant(change.abs(), 2), if change < 0.0 { "below" } else { "above" })
         } else {
-            format!("{} times", significant(1.0 / ratio, 2))
+            format!("{} times", significant(times, 2))
         };
-        told.push(format!(
-            "{} at τ = {}: σ is {size} the model ({} standard errors)",
-            channel_list(std::slice::from_ref(&channel.name)),
-            span(tau),
-            significant(sigma.abs(), 2)
-        ));
-    }
+        let (name, errors) = (channel_name(channel), significant(sigma, 2));
+        Some((sigma, format!("{name} at τ = {tau}: σ is {size} the model ({errors} standard errors)")))
+    };
+    let mut far: Vec<(f64, String)> = inertial(report).filter_map(far).collect();
+    far.sort_by(|a, b| b.0.total_cmp(&a.0));
     let is_unsure = |of: &Innovations| channels * of.chance_of_small_claim() < CHANCE;
-    let unsure: Vec<String> = inertial(report)
-        .filter(|channel| channel.assessment.innovations.as_ref().is_some_and(is_unsure))
-        .map(|channel| channel.name.clone())
-        .collect();
-    if !unsure.is_empty() {
-        told.push(format!(
-            "a Kalman filter with the models of {} would claim a smaller error than it has",
-            channel_list(&unsure)
-        ));
-    }
-    told
+    let unsure = |channel: &ChannelReport| channel.assessment.innovations.as_ref().is_some_and(is_unsure);
+    let unsure = inertial_names(report, unsure)
+        .map(|names| format!("a Kalman filter with the models of {names} would claim a smaller error than it has"));
+    far.into_iter().map(|(_, text)| text).chain(unsure).collect()
 }
 
 /// Advice in the order of the findings, with their numbers; rest comes first.
@@ -950,8 +918,7 @@ const MOST_STEPS: usize = 3;
 /// The most useful first.
 #[must_use]
 pub fn next_steps(report: &Report) -> Vec<String> {
-    let steps = advice(report).into_iter().map(|(step, _)| step);
-    steps.chain(for_filter(report)).collect()
+    advice(report).into_iter().map(|(step, _)| step).chain(for_filter(report)).collect()
 }
 
 /// With numbers of findings: `Look for a fan, a motor or the mains (2, 5).`
@@ -972,27 +939,29 @@ pub(crate) fn for_filter(report: &Report) -> Option<String> {
 
 /// Reasons why models fail on the unseen half: spikes and knocks, a change of the noise, or a lack of the model.
 fn failures(report: &Report) -> Vec<String> {
-    let own_curve = |channel: &ChannelReport| channel.first_half_curve.deviance_per_point;
+    #[derive(PartialEq)]
+    enum Reason {
+        Events,
+        Change,
+        Lack,
+        Unknown,
+    }
     let excluding = |channel: &ChannelReport| channel.after.unseen_excluding.as_ref()?.deviance_per_point;
-    let is_by_events = |channel: &ChannelReport| excluding(channel).is_some_and(|of| of <= HIGH_DEVIANCE);
-    let told = |is_one: &dyn Fn(&ChannelReport) -> bool, reason: &str| {
-        let failed = inertial(report).filter(|channel| is_high(channel) && is_one(channel));
-        let names: Vec<String> = failed.map(|channel| channel.name.clone()).collect();
-        (!names.is_empty()).then(|| format!("{reason} {}", channel_list(&names)))
+    let reason = |channel: &ChannelReport| match channel.first_half_curve.deviance_per_point {
+        _ if excluding(channel).is_some_and(|of| of <= HIGH_DEVIANCE) => Reason::Events,
+        Some(of) if of > HIGH_DEVIANCE => Reason::Change,
+        Some(_) => Reason::Lack,
+        None => Reason::Unknown,
     };
     [
-        told(&is_by_events, "spikes or knocks came oftener or larger than before in"),
-        told(
-            &|channel| !is_by_events(channel) && own_curve(channel).is_some_and(|of| of > HIGH_DEVIANCE),
-            "the noise changed in",
-        ),
-        told(
-            &|channel| !is_by_events(channel) && own_curve(channel).is_some_and(|of| of <= HIGH_DEVIANCE),
-            "the model lacks something in",
-        ),
-        told(&|channel| !is_by_events(channel) && own_curve(channel).is_none(), "the model fails in"),
+        (Reason::Events, "spikes or knocks came oftener or larger than before in"),
+        (Reason::Change, "the noise changed in"),
+        (Reason::Lack, "the model lacks something in"),
+        (Reason::Unknown, "the model fails in"),
     ]
     .into_iter()
-    .flatten()
+    .filter_map(|(of, text)| {
+        Some(format!("{text} {}", inertial_names(report, |channel| is_high(channel) && reason(channel) == of)?))
+    })
     .collect()
 }

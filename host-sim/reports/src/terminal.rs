@@ -1,14 +1,13 @@
 //! The report on one screen of at most [`MOST_LINES`] lines, with ANSI styles.
 
+use crate::coefficients::LETTERS;
 use crate::finding_text::FindingText;
-use crate::formatting::capital;
 use crate::line_breaks::broken;
 use crate::summary::{self, CoefficientTable};
 use anstyle::{AnsiColor, Style};
 use noise_analysis::report::Report;
 use std::io::{self, Write};
 
-/// Most lines.
 pub const MOST_LINES: usize = 30;
 /// Columns of the narrowest and the widest screen; text is at most [`TEXT`] wide.
 const NARROWEST: usize = 80;
@@ -29,7 +28,6 @@ const HEADING: Style = Style::new().bold();
 const FAINT: Style = Style::new().dimmed();
 const WARNING: Style = AnsiColor::Yellow.on_default().bold();
 
-/// The screen of a report.
 #[derive(Debug, Clone, Copy)]
 pub struct Screen<'a> {
     pub report: &'a Report,
@@ -39,7 +37,6 @@ pub struct Screen<'a> {
 }
 
 impl Screen<'_> {
-    /// Writes the screen.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         for line in self.lines() {
             writeln!(out, "{line}")?;
@@ -114,36 +111,27 @@ impl Screen<'_> {
             lines.push(String::new());
         }
         for (index, table) in tables.iter().enumerate() {
-            lines.extend(self.table(table, index == 0));
+            let rows = table_lines(table, index == 0, self.columns()).into_iter();
+            lines.extend(rows.map(|(style, line)| styled(style, &line)));
         }
         let conditions = summary::conditions(report);
-        if !conditions.is_empty() {
-            lines.extend(self.block("Conditions", &self.list(&conditions, CONDITIONS), FAINT));
-        }
+        let shown = capped(&conditions, "; ", "", (self.text_columns() - CHANNELS, CONDITIONS));
+        lines.extend(block("Conditions", &shown, FAINT));
         lines
     }
 
-    fn table(&self, table: &CoefficientTable, is_first: bool) -> Vec<String> {
-        table_lines(table, is_first, self.columns()).into_iter().map(|(style, line)| styled(style, &line)).collect()
-    }
-
     fn finding(&self, number: usize, finding: &FindingText) -> Vec<String> {
-        let text = if finding.weight.is_empty() {
-            finding.physics.clone()
-        } else {
-            format!("{} {}.", finding.physics, capital(&finding.weight))
-        };
+        let text = finding.sentences();
         let label = format!("{number:>2}  {}", finding.channels);
         // A long list has lines of its own.
-        let labels = broken(&label, CHANNELS - 1, "    ");
-        let texts = broken(&text, self.text_columns() - CHANNELS, "");
-        (0..labels.len().max(texts.len()))
-            .map(|line| {
-                let label = labels.get(line).map_or("", String::as_str);
-                let text = texts.get(line).map_or("", String::as_str);
-                format!("{}{text}", padded(label, CHANNELS)).trim_end().to_owned()
-            })
-            .collect()
+        let [mut labels, mut texts] =
+            [broken(&label, CHANNELS - 1, "    "), broken(&text, self.text_columns() - CHANNELS, "")];
+        let lines = labels.len().max(texts.len());
+        labels.resize(lines, String::new());
+        texts.resize(lines, String::new());
+        let line =
+            |(label, text): (&String, &String)| format!("{}{text}", padded(label, CHANNELS)).trim_end().to_owned();
+        labels.iter().zip(&texts).map(line).collect()
     }
 
     /// Unexplained and contradictions in a line each, advice in `most`.
@@ -155,17 +143,12 @@ impl Screen<'_> {
             ("Model is off", summary::contradictions_in_short(self.report)),
         ] {
             let line = text.map(|text| within(&format!("{text}."), columns));
-            lines.extend(self.block(heading, line.as_slice(), WARNING));
+            lines.extend(block(heading, line.as_slice(), WARNING));
         }
         let export = summary::for_filter(self.report).unwrap_or_default();
         let steps = capped(&summary::numbered_steps(self.report), " ", &export, (columns, most));
-        lines.extend(self.block("What to do", &steps, HEADING));
+        lines.extend(block("What to do", &steps, HEADING));
         lines
-    }
-
-    /// `most` of the `items` beside a heading.
-    fn list(&self, items: &[String], most: usize) -> Vec<String> {
-        capped(items, "; ", "", (self.text_columns() - CHANNELS, most))
     }
 
     /// Part, recording, samples, length; a long name is cut in front.
@@ -178,16 +161,17 @@ impl Screen<'_> {
         let name = if too_long > 0 { format!("…{end}") } else { name.to_owned() };
         summary::headline(self.report, self.source.map(|_| name.as_str())).join("   ")
     }
+}
 
-    fn block(&self, heading: &str, texts: &[String], style: Style) -> Vec<String> {
-        let labelled = |(index, text): (usize, &String)| {
-            let label = if index == 0 { heading } else { "" };
-            let space = " ".repeat(CHANNELS.saturating_sub(label.chars().count()));
-            let label = if label.is_empty() { String::new() } else { styled(style, label) };
-            format!("{label}{space}{text}")
-        };
-        texts.iter().enumerate().map(labelled).collect()
-    }
+/// `texts` beside a heading.
+fn block(heading: &str, texts: &[String], style: Style) -> Vec<String> {
+    let labelled = |(index, text): (usize, &String)| {
+        let label = if index == 0 { heading } else { "" };
+        let space = " ".repeat(CHANNELS.saturating_sub(label.chars().count()));
+        let label = if label.is_empty() { String::new() } else { styled(style, label) };
+        format!("{label}{space}{text}")
+    };
+    texts.iter().enumerate().map(labelled).collect()
 }
 
 /// `items` with `separator` and `last`, in so many lines and columns, and the number of the rest.
@@ -225,8 +209,7 @@ pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usi
         let line = line.trim_end();
         format!("{line}{}", left_padded(error, total.saturating_sub(line.chars().count()))).trim_end().to_owned()
     };
-    let headings: [String; 3] =
-        std::array::from_fn(|index| format!("{}, {}", ["N", "B", "K"][index], table.units[index]));
+    let headings: [String; 3] = std::array::from_fn(|index| format!("{}, {}", LETTERS[index], table.units[index]));
     let error = if is_first { "σ off by  " } else { "" };
     let mut lines = vec![(HEADING, row(table.title, headings.each_ref().map(String::as_str), error))];
     for of in &table.rows {

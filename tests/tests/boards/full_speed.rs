@@ -113,7 +113,7 @@ fn assert_recorded_stream_gives_the_identical_report(decoded: &Decoded, bursts: 
     let report = |file: &Path| {
         let recording = replay(file, GyroRange::Dps300).expect("a log").recording;
         let measurement = measurement(&recording, Some(RATE_HZ)).expect("a time base");
-        serde_json::to_string(&ReportJson::from(&analyze(&measurement))).expect("a report")
+        serde_json::to_string(&ReportJson::new(&analyze(&measurement), None)).expect("a report")
     };
     let recorded_file = folder.path().join("recorded.csv");
     let mut tape = RawStreamRecorder::create(&recorded_file).expect("a log");

@@ -7,7 +7,7 @@ use super::bias_response::BiasResponse;
 use super::bias_step::{self, BiasStep, StepPosition};
 use super::block_means::{BLOCKS, BlockMeans};
 use super::gls_regression::{GlsRegression, RegressionEstimate};
-use super::noise_grid::{NoiseGrid, NoiseGrids};
+use super::noise_grid::NoiseGrid;
 use super::thermal_response::{self, TemperatureCourse};
 use super::time_constant::TimeConstant;
 use super::turn_on::Transient;
@@ -32,6 +32,8 @@ pub(crate) struct BiasSensitivity {
     pub error: f64,
     /// Degrees of freedom of `error`.
     pub degrees_of_freedom: f64,
+    /// Time constant, s, over which the regressor was smoothed; 0 if it is as measured.
+    pub smoothed_over_s: f64,
 }
 
 #[derive(Debug, Default, Clone, PartialEq)]
@@ -53,7 +55,7 @@ struct Covariates<'a> {
 
 enum Candidate {
     Ramp,
-    Regressor(usize),
+    Regressor { index: usize, smoothed_over_s: f64 },
     Step(StepPosition),
     Transient(Transient),
     Lagged(TimeConstant),
@@ -76,7 +78,6 @@ pub(crate) fn find(
     series: &Series,
     regressors: &[&Series],
     accelerations: &[Acceleration],
-    grids: &NoiseGrids,
     least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
     let regressors: Vec<(usize, &Series)> =
@@ -88,9 +89,9 @@ pub(crate) fn find(
             regressors.iter().map(|&(index, regressor)| (index, regressor.clone().in_common(&[&series]))).collect();
         let regressors: Vec<(usize, &Series)> =
             regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
-        return find_on_common_samples(&series, &regressors, accelerations, grids, least_step);
+        return find_on_common_samples(&series, &regressors, accelerations, least_step);
     }
-    find_on_common_samples(series, &regressors, accelerations, grids, least_step)
+    find_on_common_samples(series, &regressors, accelerations, least_step)
 }
 
 fn covers(regressor: &Series, series: &Series) -> bool {
@@ -102,14 +103,13 @@ fn find_on_common_samples(
     series: &Series,
     regressors: &[(usize, &Series)],
     accelerations: &[Acceleration],
-    grids: &NoiseGrids,
     least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
     // Squares of small changes beside a large bias would lose digits.
     let (first, bias) = series.slots.first().copied().zip(series.values.first().copied()).unwrap_or_default();
     let series = &series.clone().lowered_from(first, bias);
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
-    let grid = grids.get(&blocks);
+    let grid = NoiseGrid::from_blocks(&blocks);
     let series_of = |index: usize| regressors.iter().find(|(of, _)| *of == index).map(|(_, series)| *series);
     let regressors: Vec<(usize, DVector<f64>)> = regressors
         .iter()
@@ -142,11 +142,12 @@ fn find_on_common_samples(
             Candidate::Step(position) => {
                 changes.step = Some(bias_step::detection(series, position, &estimate, *p_value));
             }
-            Candidate::Regressor(index) => {
+            &Candidate::Regressor { index, smoothed_over_s } => {
                 let RegressionEstimate { size: sensitivity, error, .. } = estimate;
                 let degrees_of_freedom = BLOCKS as f64;
-                changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error, degrees_of_freedom }));
-                if covariates.temperature.as_ref().is_some_and(|(of, _)| of == index) {
+                let of = BiasSensitivity { sensitivity, error, degrees_of_freedom, smoothed_over_s };
+                changes.sensitivities.push((index, of));
+                if covariates.temperature.as_ref().is_some_and(|(of, _)| *of == index) {
                     linear = Some(estimate);
                 }
             }
@@ -192,14 +193,15 @@ fn linear_part(
 ) -> Option<Accepted> {
     let (temperature, _) = covariates.temperature.as_ref()?;
     let is_curved = accepted.iter().any(|of| matches!(of.candidate, Candidate::Squared));
-    let is_known = |of: &Accepted| matches!(of.candidate, Candidate::Regressor(index) if index == *temperature);
+    let is_known = |of: &Accepted| matches!(of.candidate, Candidate::Regressor { index, .. } if index == *temperature);
     if !is_curved || accepted.iter().any(is_known) {
         return None;
     }
     let (index, regressor) = covariates.regressors.iter().find(|(index, _)| index == temperature)?;
     let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
     let RegressionEstimate { p_value, .. } = GlsRegression::new(blocks, grid, &known).estimate(regressor)?;
-    Some(Accepted { candidate: Candidate::Regressor(*index), regressor: regressor.clone(), p_value })
+    let candidate = Candidate::Regressor { index: *index, smoothed_over_s: 0.0 };
+    Some(Accepted { candidate, regressor: regressor.clone(), p_value })
 }
 
 /// True if the block means of a regressor span at least one count; smaller changes are rounding.
@@ -229,7 +231,7 @@ fn best_candidate(
     let estimates =
         regression.estimates_below(REFUTED, &single().map(|(_, regressor)| regressor.clone()).collect::<Vec<_>>());
     for ((index, regressor), estimate) in single().zip(estimates) {
-        let candidate = index.map_or(Candidate::Ramp, Candidate::Regressor);
+        let candidate = index.map_or(Candidate::Ramp, |index| Candidate::Regressor { index, smoothed_over_s: 0.0 });
         let Some(RegressionEstimate { p_value, deviance, .. }) = estimate else { continue };
         let is_temperature = |(of, _): &(usize, _)| index == Some(*of);
         resembles_temperature |= temperature.as_ref().is_some_and(is_temperature);
@@ -259,7 +261,7 @@ fn best_candidate(
                 let regressor = course.lagged_regressor(lag.value, blocks);
                 (lag.estimate, Candidate::Lagged(lag), regressor)
             } else {
-                (without_lag, Candidate::Regressor(*index), smoothed)
+                (without_lag, Candidate::Regressor { index: *index, smoothed_over_s: lag.value }, smoothed)
             };
             if p_value < SIGNIFICANCE {
                 rivals.push((deviance + thermal_response::ADVANTAGE, Accepted { candidate, regressor, p_value }));

@@ -37,6 +37,16 @@ impl Course {
         DVector::from_iterator(blocks.numbers.len(), blocks.numbers.iter().map(mean))
     }
 
+    /// Interpolated in the sample period `slot`.
+    pub(super) fn at(&self, slot: u64) -> f64 {
+        let Self { width, values } = self;
+        let place = (slot as f64 / *width as f64 - 0.5).clamp(0.0, (values.len() - 1) as f64);
+        let before = place.floor() as usize;
+        let after = (before + 1).min(values.len() - 1);
+        let part = place - before as f64;
+        values[before] * (1.0 - part) + values[after] * part
+    }
+
     pub(super) fn mean(&self) -> f64 {
         self.values.iter().sum::<f64>() / self.values.len() as f64
     }
@@ -58,12 +68,7 @@ impl Course {
 impl BiasResponse {
     /// The bias in the sample period `slot`, in the channel's unit; 0 at the mean of what it follows.
     pub(crate) fn bias(&self, slot: u64) -> f64 {
-        let Course { width, values } = &self.bias;
-        let place = (slot as f64 / *width as f64 - 0.5).clamp(0.0, (values.len() - 1) as f64);
-        let before = place.floor() as usize;
-        let after = (before + 1).min(values.len() - 1);
-        let part = place - before as f64;
-        values[before] * (1.0 - part) + values[after] * part
+        self.bias.at(slot)
     }
 }
 

@@ -1,7 +1,7 @@
 //! A step in the bias, which has to be likelier by a margin than random walk, flicker noise, ramps and temperature.
 
 use super::block_means::BlockMeans;
-use super::gls_regression::{GlsRegression, RegressionEstimate, StepSizes};
+use super::gls_regression::{GlsRegression, RegressionEstimate, Sizes};
 use super::noise_grid::NoiseGrid;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
@@ -45,10 +45,11 @@ pub(super) fn find(
     known: &[DVector<f64>],
     regression: &GlsRegression<'_>,
 ) -> Option<BiasStep> {
-    if !regression.any_step_may_be_below(SIGNIFICANCE) {
+    let steps = regression.steps();
+    if !regression.any_may_be_below(SIGNIFICANCE, &steps) {
         return None;
     }
-    let scan = StepScan::new(regression, &regression.steps())?;
+    let scan = StepScan::new(regression, &steps)?;
     let p_value = scan.p_value_anywhere();
     if p_value >= SIGNIFICANCE {
         return None;
@@ -104,9 +105,9 @@ struct StepScan {
 }
 
 impl StepScan {
-    fn new(regression: &GlsRegression<'_>, steps: &[Option<StepSizes>]) -> Option<Self> {
+    fn new(regression: &GlsRegression<'_>, steps: &[Option<Sizes>]) -> Option<Self> {
         let sought = ENDS..steps.len().saturating_sub(ENDS) + 1;
-        let tried = |(at, step): (usize, &Option<StepSizes>)| {
+        let tried = |(at, step): (usize, &Option<Sizes>)| {
             step.as_ref().filter(|_| sought.contains(&at)).and_then(|step| regression.deviance_with(step))
         };
         let tried: Vec<Option<f64>> = steps.iter().enumerate().map(tried).collect();
@@ -114,7 +115,7 @@ impl StepScan {
         let deviances: Vec<f64> = tried.iter().map(|deviance| deviance.unwrap_or(without)).collect();
         let of_steps = tried.iter().enumerate().filter_map(|(at, deviance)| Some((at, (*deviance)?)));
         let (at, deviance) = of_steps.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
-        let best = regression.estimate_step(steps[at].as_ref()?)?;
+        let best = regression.average(steps[at].as_ref()?)?;
         let independent = regression.independent_steps();
         Some(Self { deviances, deviance, at, size: best.size, p_value: best.p_value, independent })
     }

@@ -1,240 +1,200 @@
-//! The covariance of the means of equal blocks in white, flicker and random-walk noise, on a grid of mixtures with
-//! equal prior probability.
+//! The noise of block means on a grid of mixtures of white, flicker and random-walk noise with equal prior probability.
 //!
-//! All mixtures with one ratio of flicker to white noise are diagonal in the basis of the walk's generalised
-//! eigenvectors, so 153 mixtures need nine matrices.
+//! A mixture is one weight per order of the cosine transform. An unknown constant is order 0, which is left out. A block with
+//! fewer samples than the others has an additional error of its own, of unknown size where it has none.
 
 use super::block_means::{BLOCKS, BlockMeans};
-use crate::parallel::in_parallel;
-use nalgebra::{DMatrix, DVector, DVectorView};
-use std::f64::consts::{LN_2, PI};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use crate::spectra::block_cosines::{flicker_squares, walk_squares};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
+use std::sync::{Arc, LazyLock, OnceLock};
 
 /// Least value and number of values of B² and of a walk's variance per block, over a mean's white variance, beside 0.
 const FLICKER: (f64, usize) = (1e-2, 8);
 const WALK: (f64, usize) = (1e-5, 16);
-const FILL_STEP: f64 = 1.0 / 64.0;
+/// Blocks with at least this part of the usual samples have the usual white variance: it differs by less than a quarter.
+const USUAL_FILL: f64 = 0.8;
 
-/// The covariances of all mixtures for one set of blocks.
-pub type NoiseGrid = Arc<Vec<NoiseFamily>>;
-
-/// The mixtures with one ratio of flicker to white noise.
-pub struct NoiseFamily {
-    /// Column `b`: coordinates of a 1 in block `b`.
-    basis: DMatrix<f64>,
-    constant: DVector<f64>,
-    pub mixtures: Vec<NoiseCovariance>,
-}
-
-/// Covariance of block means for one mixture, in units of the white variance, with an unknown constant.
-pub struct NoiseCovariance {
-    precisions: DVector<f64>,
-    /// `precisions` times the coordinates of the constant, over the root of its information.
-    along_constant: DVector<f64>,
-    /// ln determinant of the covariance times the information on the constant (REML).
-    pub log_determinant: f64,
-    steps: OnceLock<StepInformation>,
-}
-
-struct StepInformation {
-    of_size: Vec<f64>,
-    independent: f64,
-}
-
-impl NoiseFamily {
-    /// White variance 1 in a whole block, B² = `flicker`, a walk of variance `walks` per block; `None` if not definite.
-    fn new(numbers: &[usize], fills: &[f64], flicker: f64, walks: impl Iterator<Item = f64>) -> Option<Self> {
-        let coloured = flicker_covariance();
-        let count = numbers.len();
-        let stationary = DMatrix::from_fn(count, count, |row, column| {
-            let white = if row == column { 1.0 / fills[row] } else { 0.0 };
-            white + flicker * coloured[numbers[row].abs_diff(numbers[column])]
-        });
-        // Variance of the walk in the middle of the earlier block; a third of a block for the same block.
-        let walk = DMatrix::from_fn(count, count, |row, column| {
-            numbers[row.min(column)] as f64 + if row == column { 1.0 / 3.0 } else { 0.5 }
-        });
-        let factor = stationary.cholesky()?;
-        let log_stationary = 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>();
-        let whitening = factor.l().solve_lower_triangular(&DMatrix::identity(count, count))?;
-        let eigen = (&whitening * walk * whitening.transpose()).symmetric_eigen();
-        let basis = eigen.eigenvectors.transpose() * whitening;
-        let constant = basis.column_sum();
-        let mixture = |walk: f64| {
-            let variances = eigen.eigenvalues.map(|of_walk| 1.0 + walk * of_walk.max(0.0));
-            let precisions = variances.map(f64::recip);
-            let along = precisions.component_mul(&constant);
-            let information = along.dot(&constant);
-            let log_covariance = log_stationary + variances.iter().map(|variance| variance.ln()).sum::<f64>();
-            NoiseCovariance {
-                precisions,
-                along_constant: along / information.sqrt(),
-                log_determinant: log_covariance + information.ln(),
-                steps: OnceLock::new(),
-            }
-        };
-        let mixtures = walks.map(mixture).collect();
-        Some(Self { basis, constant, mixtures })
-    }
-
-    pub(super) fn coordinates(&self, values: &DVector<f64>) -> DVector<f64> {
-        &self.basis * values
-    }
-
-    pub(super) fn coordinates_of_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        &self.basis * columns
-    }
-
-    /// Products of the columns' coordinates with a 1 in each block, in rows.
-    pub(super) fn products_with_blocks(&self, weighted: &DMatrix<f64>) -> DMatrix<f64> {
-        weighted.transpose() * &self.basis
-    }
-
-    pub(super) fn step_information<'a>(&self, mixture: &'a NoiseCovariance) -> &'a [f64] {
-        &self.steps(mixture).of_size
-    }
-
-    /// Effective number of independent tests of a step: Σ acos ρ/π with the correlation ρ of neighbouring steps.
-    pub(super) fn independent_steps(&self, mixture: &NoiseCovariance) -> f64 {
-        self.steps(mixture).independent
-    }
-
-    fn steps<'a>(&self, mixture: &'a NoiseCovariance) -> &'a StepInformation {
-        mixture.steps.get_or_init(|| StepInformation::new(self, mixture))
-    }
-}
-
-impl NoiseCovariance {
-    /// Coordinates times the inverse covariance, without the constant.
-    pub(super) fn weighted(&self, coordinates: &DVector<f64>) -> DVector<f64> {
-        let mut weighted = self.precisions.component_mul(coordinates);
-        weighted.axpy(-self.along_constant.dot(coordinates), &self.along_constant, 1.0);
-        weighted
-    }
-
-    pub(super) fn weighted_columns(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut weighted = coordinates.clone();
-        for mut column in weighted.column_iter_mut() {
-            let along = self.along_constant.dot(&column);
-            column.component_mul_assign(&self.precisions);
-            column.axpy(-along, &self.along_constant, 1.0);
-        }
-        weighted
-    }
-
-    /// Weighted sum of squares of the values with these coordinates, without the constant.
-    pub(super) fn square(&self, coordinates: DVectorView<'_, f64>) -> f64 {
-        let weighted = self.precisions.component_mul(&coordinates);
-        weighted.dot(&coordinates) - self.along_constant.dot(&coordinates).powi(2)
-    }
-}
-
-impl StepInformation {
-    fn new(family: &NoiseFamily, mixture: &NoiseCovariance) -> Self {
-        let size = family.basis.ncols();
-        // The step before the first block is the constant.
-        let mut step = family.constant.clone();
-        let later = family.basis.column_iter().take(size - 1).map(|block| {
-            step -= block;
-            mixture.square(step.column(0))
-        });
-        let of_size: Vec<f64> = std::iter::once(0.0).chain(later).collect();
-        let between = |at: usize| {
-            // Two neighbouring steps differ in one block.
-            let of_block = mixture.square(family.basis.column(at));
-            let shared = 0.5 * (of_size[at] + of_size[at + 1] - of_block);
-            let correlation = shared / (of_size[at] * of_size[at + 1]).sqrt();
-            if correlation.is_finite() { correlation.clamp(-1.0, 1.0).acos() / PI } else { 0.0 }
-        };
-        let independent = (1..size - 1).map(between).sum();
-        Self { of_size, independent }
-    }
-}
-
-/// The grids of a recording's channels: one per set of blocks, computed once.
-#[derive(Default)]
-pub struct NoiseGrids {
-    known: Mutex<Vec<(Layout, NoiseGrid)>>,
-}
-
-/// Numbers of blocks, and their fills in units of [`FILL_STEP`].
-type Layout = (Vec<usize>, Vec<u32>);
-
-impl NoiseGrids {
-    /// The grid for these blocks.
-    pub fn get(&self, blocks: &BlockMeans) -> NoiseGrid {
-        static WITHOUT_GAPS: OnceLock<NoiseGrid> = OnceLock::new();
-        let fills: Vec<u32> = blocks.fills.iter().map(|fill| (fill / FILL_STEP).round() as u32).collect();
-        let layout = (blocks.numbers.clone(), fills);
-        if layout.0.len() == BLOCKS && layout.1.iter().all(|&fill| f64::from(fill) * FILL_STEP == 1.0) {
-            return WITHOUT_GAPS.get_or_init(|| noise_grid(&layout)).clone();
-        }
-        // Valid after a panic elsewhere: entries are added whole.
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, grid)) = known.iter().find(|(other, _)| *other == layout) {
-            return grid.clone();
-        }
-        let grid = noise_grid(&layout);
-        known.push((layout, grid.clone()));
-        grid
-    }
-}
-
-fn noise_grid((numbers, fills): &Layout) -> NoiseGrid {
-    let fills: Vec<f64> = fills.iter().map(|&fill| f64::from(fill) * FILL_STEP).collect();
+/// Variances of the orders of each mixture, in units of the white variance of a mean.
+static VARIANCES: LazyLock<Vec<DVector<f64>>> = LazyLock::new(|| {
     let values = |(least, count): (f64, usize)| {
         std::iter::once(0.0).chain((0..count).map(move |at| least * 10f64.powf(0.5 * at as f64)))
     };
-    let flickers: Vec<f64> = values(FLICKER).collect();
-    let families = in_parallel(&flickers, |&flicker| NoiseFamily::new(numbers, &fills, flicker, values(WALK)));
-    Arc::new(families.into_iter().flatten().collect())
-}
+    let [flicker, walk] = [flicker_squares(BLOCKS), walk_squares(BLOCKS)].map(DVector::from_vec);
+    let mixtures = values(FLICKER).flat_map(|b2| values(WALK).map(move |k2| (b2, k2)));
+    mixtures.map(|(b2, k2)| (b2 * &flicker + k2 * &walk).add_scalar(1.0)).collect()
+});
 
-/// Covariance of the means of two blocks in flicker noise with B = 1, a sum of Gauss-Markov processes, by distance.
-fn flicker_covariance() -> Vec<f64> {
-    let mut covariance = vec![0.0; BLOCKS];
-    let mut time = 0.125;
-    while time <= 4.0 * BLOCKS as f64 {
-        for (entry, mean) in covariance.iter_mut().zip(markov_covariance(time)) {
-            *entry += LN_2 / PI * mean;
-        }
-        time *= 2.0;
-    }
-    covariance
-}
-
-/// Covariance of block means in a Gauss-Markov process of variance 1, time constant in blocks, by their distance.
-pub fn markov_covariance(time: f64) -> impl Iterator<Item = f64> {
-    let decay = move |blocks: f64| (-blocks / time).exp();
-    (0..).map(move |distance: usize| {
-        if distance == 0 {
-            2.0 * time * (1.0 - time * (1.0 - decay(1.0)))
-        } else {
-            let distance = distance as f64;
-            time * time * (decay(distance - 1.0) - 2.0 * decay(distance) + decay(distance + 1.0))
-        }
+/// Row: an order from 1 on. Column: a 1 in one block.
+static BASIS: LazyLock<DMatrix<f64>> = LazyLock::new(|| {
+    DMatrix::from_fn(BLOCKS - 1, BLOCKS, |order, block| {
+        let phase = PI * ((order + 1) * (2 * block + 1)) as f64 / (2 * BLOCKS) as f64;
+        (2.0 / BLOCKS as f64).sqrt() * phase.cos()
     })
+});
+
+/// The weights of all mixtures for one set of blocks.
+pub struct NoiseGrid {
+    /// Of the blocks with a mean.
+    basis: DMatrix<f64>,
+    pub(super) mixtures: Vec<NoiseMixture>,
+    steps: OnceLock<Regressors>,
+}
+
+pub(super) struct NoiseMixture {
+    weights: DVector<f64>,
+    /// The weighted orders of each block with fewer samples, orthonormal.
+    along_gaps: DMatrix<f64>,
+    /// ln determinant of the covariance times the information on what is projected out (REML).
+    pub log_determinant: f64,
+}
+
+/// Regressors that are compared with the means.
+pub(super) struct Regressors {
+    pub coordinates: DMatrix<f64>,
+    /// On the size of each regressor (row) in each mixture (column).
+    pub information: DMatrix<f64>,
+}
+
+impl NoiseGrid {
+    /// For the blocks of these means.
+    #[must_use]
+    pub fn from_blocks(blocks: &BlockMeans) -> Arc<Self> {
+        static WITHOUT_GAPS: LazyLock<Arc<NoiseGrid>> = LazyLock::new(|| NoiseGrid::new(&[1.0; BLOCKS], &[]).into());
+        let mut fills = [0.0; BLOCKS];
+        blocks.numbers.iter().zip(&blocks.fills).for_each(|(number, fill)| fills[*number] = *fill);
+        let mut ascending = blocks.fills.clone();
+        ascending.sort_by(f64::total_cmp);
+        let usual = ascending[ascending.len() * 3 / 4];
+        fills.iter_mut().for_each(|fill| *fill /= usual);
+        let gaps: Vec<usize> = (0..BLOCKS).filter(|number| fills[*number] < USUAL_FILL).collect();
+        if gaps.is_empty() { Arc::clone(&WITHOUT_GAPS) } else { Self::new(&fills, &gaps).into() }
+    }
+
+    /// With these parts of the usual samples in each block, of which the `gaps` have fewer.
+    fn new(fills: &[f64; BLOCKS], gaps: &[usize]) -> Self {
+        let columns = BASIS.select_columns(gaps);
+        // The inverse variance of the additional error.
+        let known: Vec<f64> = gaps.iter().map(|number| fills[*number] / (1.0 - fills[*number])).collect();
+        let with_mean: Vec<usize> = (0..BLOCKS).filter(|number| fills[*number] > 0.0).collect();
+        let mixture = |variances: &DVector<f64>| {
+            let weights = variances.map(f64::recip);
+            let weighted = weighted_by(&weights, &columns);
+            let (along_gaps, log_information) = orthonormal(&columns, &weighted, &known)?;
+            let log_determinant = variances.iter().map(|variance| variance.ln()).sum::<f64>() + log_information;
+            Some(NoiseMixture { weights, along_gaps, log_determinant })
+        };
+        Self {
+            basis: BASIS.select_columns(&with_mean),
+            mixtures: VARIANCES.iter().filter_map(mixture).collect(),
+            steps: OnceLock::new(),
+        }
+    }
+
+    /// Orders of the cosine transforms of `columns` with one value per mean.
+    pub(super) fn coordinates(&self, columns: &[DVector<f64>]) -> DMatrix<f64> {
+        // A constant is in the empty blocks alone; without it, nothing is lost to rounding.
+        let centred: Vec<DVector<f64>> = columns.iter().map(|of| of.add_scalar(-of.mean())).collect();
+        if centred.is_empty() { DMatrix::zeros(BLOCKS - 1, 0) } else { &self.basis * DMatrix::from_columns(&centred) }
+    }
+
+    pub(super) fn regressors(&self, columns: &[DVector<f64>]) -> Regressors {
+        let coordinates = self.coordinates(columns);
+        Regressors { information: self.information(&coordinates), coordinates }
+    }
+
+    fn information(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
+        let squares = coordinates.component_mul(coordinates);
+        let mut information = DMatrix::zeros(coordinates.ncols(), self.mixtures.len());
+        for (mixture, mut of_mixture) in self.mixtures.iter().zip(information.column_iter_mut()) {
+            of_mixture.gemv_tr(1.0, &squares, &mixture.weights, 0.0);
+            if mixture.along_gaps.ncols() > 0 {
+                let along_gaps = mixture.along_gaps.transpose() * coordinates;
+                of_mixture.iter_mut().zip(along_gaps.column_iter()).for_each(|(of, along)| *of -= along.norm_squared());
+            }
+        }
+        information
+    }
+
+    /// Steps before each block with a mean but the first.
+    pub(super) fn steps(&self) -> &Regressors {
+        self.steps.get_or_init(|| {
+            let count = self.basis.ncols();
+            let step = |first: usize| DVector::from_fn(count, |at, _| f64::from(u8::from(at >= first)));
+            self.regressors(&(1..count).map(step).collect::<Vec<_>>())
+        })
+    }
+
+    /// Effective number of independent tests of a step in each mixture: Σ acos ρ/π with the correlation ρ of neighbouring
+    /// steps.
+    pub(super) fn independent_steps(&self) -> impl Iterator<Item = f64> {
+        let blocks = self.information(&self.basis);
+        let steps = &self.steps().information;
+        (0..self.mixtures.len()).map(move |mixture| {
+            let between = |at: usize| {
+                // Two neighbouring steps differ in one block.
+                let (one, other) = (steps[(at, mixture)], steps[(at + 1, mixture)]);
+                let correlation = 0.5 * (one + other - blocks[(at + 1, mixture)]) / (one * other).sqrt();
+                if correlation.is_finite() { correlation.clamp(-1.0, 1.0).acos() / PI } else { 0.0 }
+            };
+            (0..steps.nrows() - 1).map(between).sum()
+        })
+    }
+}
+
+impl NoiseMixture {
+    /// Coordinates times the inverse covariance, without the constant.
+    pub(super) fn weighted(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
+        let weighted = weighted_by(&self.weights, coordinates);
+        if self.along_gaps.ncols() == 0 {
+            return weighted;
+        }
+        weighted - &self.along_gaps * (self.along_gaps.transpose() * coordinates)
+    }
+}
+
+fn weighted_by(weights: &DVector<f64>, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut weighted = coordinates.clone();
+    weighted.column_iter_mut().for_each(|mut column| column.component_mul_assign(weights));
+    weighted
+}
+
+/// Combinations of the `weighted` columns whose products with `columns` are those with orthonormal ones, and the ln determinant of
+/// their information. `known` is added to the information on each; `None` if a column is a combination of the others.
+pub(super) fn orthonormal(
+    columns: &DMatrix<f64>,
+    weighted: &DMatrix<f64>,
+    known: &[f64],
+) -> Option<(DMatrix<f64>, f64)> {
+    if columns.ncols() == 0 {
+        return Some((weighted.clone(), 0.0));
+    }
+    let mut information = columns.transpose() * weighted;
+    known.iter().enumerate().for_each(|(at, known)| information[(at, at)] += known);
+    let factor = information.cholesky()?;
+    let along = factor.l_dirty().solve_lower_triangular(&weighted.transpose())?.transpose();
+    Some((along, 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>()))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BLOCKS, NoiseFamily, flicker_covariance};
-    use nalgebra::{DMatrix, DVector};
+    use super::*;
 
+    /// In white noise and a random walk the weights are the inverse of the covariance of the means, exactly.
     #[test]
     fn mixtures_weigh_as_the_inverse_of_their_covariance() {
-        let numbers: Vec<usize> = (0..BLOCKS).filter(|number| ![5, 70].contains(number)).collect();
+        let numbers: Vec<usize> = (0..BLOCKS).filter(|number| ![5, 70, 71].contains(number)).collect();
         let count = numbers.len();
         let fills: Vec<f64> = (0..count).map(|at| if at == 30 { 0.5 } else { 1.0 }).collect();
-        let (flicker, walk) = (0.3, 0.02);
-        let family = NoiseFamily::new(&numbers, &fills, flicker, [walk].into_iter()).expect("positive definite");
-        let mixture = &family.mixtures[0];
+        let blocks = BlockMeans { width: 16, means: DVector::zeros(count), fills, numbers };
+        let grid = NoiseGrid::from_blocks(&blocks);
+        // No flicker noise; the tenth walk.
+        let (mixture, walk) = (&grid.mixtures[9], 1e-5 * 10f64.powf(4.0));
 
-        let coloured = flicker_covariance();
         let covariance = DMatrix::from_fn(count, count, |row, column| {
-            let (first, second) = (numbers[row.min(column)], numbers[row.max(column)]);
-            let (white, middle) = if row == column { (1.0 / fills[row], 1.0 / 3.0) } else { (0.0, 0.5) };
-            white + flicker * coloured[second - first] + walk * (first as f64 + middle)
+            let first = blocks.numbers[row.min(column)] as f64;
+            let (white, middle) = if row == column { (1.0 / blocks.fills[row], 1.0 / 3.0) } else { (0.0, 0.5) };
+            white + walk * (first + middle)
         });
         let inverse = covariance.clone().try_inverse().expect("positive definite");
         let ones = DVector::from_element(count, 1.0);
@@ -243,13 +203,23 @@ mod tests {
         let precision = &inverse - &along * along.transpose() / information;
 
         let values = DVector::from_fn(count, |at, _| (at as f64 * 0.7).sin() + 0.01 * at as f64);
-        let weighted = DMatrix::from_columns(&[mixture.weighted(&family.coordinates(&values))]);
-        let weighted = family.products_with_blocks(&weighted).transpose();
+        let weighted = grid.basis.transpose() * mixture.weighted(&grid.coordinates(std::slice::from_ref(&values)));
         assert!((&weighted - &precision * &values).amax() < 1e-9 * (&precision * &values).amax());
-        let log_determinant = covariance.cholesky().expect("positive definite").determinant().ln() + information.ln();
-        assert!((mixture.log_determinant - log_determinant).abs() < 1e-8);
         let step = DVector::from_fn(count, |at, _| if at >= 40 { 1.0 } else { 0.0 });
         let of_step = (step.transpose() * &precision * &step)[0];
-        assert!((family.step_information(mixture)[40] / of_step - 1.0).abs() < 1e-9);
+        assert!((grid.steps().information[(39, 9)] / of_step - 1.0).abs() < 1e-9);
+
+        // Determinants of two mixtures, whose common factor is that of the additional errors.
+        let log_determinant = |walk: f64| {
+            let covariance = &covariance
+                + DMatrix::from_fn(count, count, |row, column| {
+                    let middle = if row == column { 1.0 / 3.0 } else { 0.5 };
+                    (walk - 0.1) * (blocks.numbers[row.min(column)] as f64 + middle)
+                });
+            let factor = covariance.cholesky().expect("positive definite");
+            factor.determinant().ln() + ones.dot(&factor.solve(&ones)).ln()
+        };
+        let expected = log_determinant(0.1) - log_determinant(0.0);
+        assert!((mixture.log_determinant - grid.mixtures[0].log_determinant - expected).abs() < 1e-8);
     }
 }

@@ -1,7 +1,6 @@
 //! Every detector on recordings of the virtual sensor, with and without the effect.
 
 use super::bias::{self, BiasChanges};
-use super::noise_grid::NoiseGrids;
 use super::{effective_lsb, spikes};
 use crate::bounds::Parameter;
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
@@ -65,7 +64,7 @@ impl Case {
 }
 
 fn bias_changes(series: &Series) -> BiasChanges {
-    bias::find(series, &[], &[], &NoiseGrids::default(), &|| 0.0)
+    bias::find(series, &[], &[], &|| 0.0)
 }
 
 fn value_of(detection: &Detection, name: &str) -> Parameter {
@@ -251,7 +250,7 @@ fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
         series
     };
     let found = |series: &Series, least_counts: f64| {
-        bias::find(series, &[], &[], &NoiseGrids::default(), &|| least_counts * series.resolution).step.is_some()
+        bias::find(series, &[], &[], &|| least_counts * series.resolution).step.is_some()
     };
     let (near, far) = (series(0.4), series(3.0));
     assert!(found(&near, 0.0) && !found(&near, 1.5));
@@ -276,8 +275,7 @@ fn a_ramp_that_others_explain_is_none() {
     let sum = |at: usize| regressors.iter().map(|of| of[at]).sum::<f64>();
     let bias = series((0..SAMPLES).map(|at| sum(at) + 0.1 * random.sample::<f64, _>(StandardNormal)).collect());
     let regressors = regressors.map(series);
-    let BiasChanges { ramp, sensitivities, .. } =
-        bias::find(&bias, &regressors.each_ref(), &[], &NoiseGrids::default(), &|| 0.0);
+    let BiasChanges { ramp, sensitivities, .. } = bias::find(&bias, &regressors.each_ref(), &[], &|| 0.0);
     assert_eq!((ramp, sensitivities.len()), (None, 3));
     for (_, of) in sensitivities {
         assert!((of.sensitivity - 1.0).abs() < 4.0 * of.error, "{of:?}");
@@ -310,10 +308,7 @@ fn ramps_telegraph_noise_and_temperature_are_no_steps() {
     simulation.scenario.environment.temperature =
         TemperatureProfile { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureProfile::default() };
     let case = Case::of(simulation);
-    assert_eq!(
-        bias::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &[], &NoiseGrids::default(), &|| 0.0).step,
-        None
-    );
+    assert_eq!(bias::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &[], &|| 0.0).step, None);
 }
 
 #[test]
@@ -359,9 +354,8 @@ fn dependence_on_temperature_is_no_ramp() {
         Case::of(simulation)
     };
     let case = warming(InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: -0.05 }, 8.0, 17);
-    let follows = |case: &Case, channel: Channel| {
-        bias::find(&case.series(channel), &[&case.series(Channel::Temp)], &[], &NoiseGrids::default(), &|| 0.0)
-    };
+    let follows =
+        |case: &Case, channel: Channel| bias::find(&case.series(channel), &[&case.series(Channel::Temp)], &[], &|| 0.0);
     let BiasChanges { ramp, sensitivities, .. } = follows(&case, GYRO);
     assert_eq!(ramp, None);
     let (0, sensitivities) = sensitivities[0] else { panic!("{sensitivities:?}") };

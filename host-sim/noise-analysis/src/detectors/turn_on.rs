@@ -83,7 +83,6 @@ fn course(time_constant: f64, blocks: &BlockMeans) -> Course {
 #[cfg(test)]
 mod tests {
     use crate::detectors::bias;
-    use crate::detectors::noise_grid::NoiseGrids;
     use crate::effects::{Effect, TurnOnTransient};
     use crate::samples::series::Series;
     use rand::{Rng, SeedableRng};
@@ -102,7 +101,7 @@ mod tests {
         let values = slots.clone().map(value).collect();
         let series =
             Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.1, resolution: 1e-3, unit: "g" };
-        let changes = bias::find(&series, &[], &[], &NoiseGrids::default(), &|| 0.0);
+        let changes = bias::find(&series, &[], &[], &|| 0.0);
         let detections = changes.step.into_iter().chain(changes.ramp).map(|found| found.effect);
         changes.responses.into_iter().map(|of| of.effect).chain(detections).collect()
     }

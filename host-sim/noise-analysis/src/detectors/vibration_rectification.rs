@@ -18,6 +18,8 @@ const FEWEST_BLOCKS: f64 = 4.0;
 pub(crate) struct Acceleration<'a> {
     pub name: &'static str,
     pub series: &'a Series,
+    /// Variance within each value of the series, by its sample period; empty if it has samples.
+    pub variances: &'a [f64],
     /// Largest possible sensitivity, in the shaken channel's unit over g²; `None` if unknown.
     pub largest: Option<f64>,
 }
@@ -37,7 +39,7 @@ impl<'a> Vibration<'a> {
     /// `None` if it does not change, or only for a moment.
     pub(super) fn new(acceleration: Acceleration<'a>, blocks: &BlockMeans) -> Option<Self> {
         let width = (blocks.width / FRACTIONS).max(FEWEST).min(blocks.width);
-        let course = Course { width, values: variances(acceleration.series, width)? };
+        let course = Course { width, values: variances(acceleration, width)? };
         let in_blocks = course.in_blocks(blocks);
         let above: Vec<f64> = in_blocks.iter().map(|value| value - in_blocks.min()).collect();
         let (sum, squares) = above.iter().fold((0.0, 0.0), |(sum, squares), of| (sum + of, squares + of * of));
@@ -68,18 +70,19 @@ impl<'a> Vibration<'a> {
 }
 
 /// Variance per `width` sample periods; the one before if fewer than half of the samples are there.
-fn variances(series: &Series, width: u64) -> Option<Vec<f64>> {
+fn variances(Acceleration { series, variances, .. }: Acceleration, width: u64) -> Option<Vec<f64>> {
     let count = usize::try_from(series.slots.last()? / width + 1).ok()?;
     // Sums about a near value, against cancellation.
     let origin = *series.values.first()?;
-    let mut sums = vec![(0.0, 0.0, 0.0); count];
+    let mut sums = vec![(0.0, 0.0, 0.0, 0.0); count];
     for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
-        let (sum, squares, count) = &mut sums[(slot / width) as usize];
+        let (sum, squares, within, count) = &mut sums[(slot / width) as usize];
         let value = value - origin;
         (*sum, *squares, *count) = (*sum + value, *squares + value * value, *count + 1.0);
+        *within += variances.get(slot as usize).copied().unwrap_or(0.0);
     }
-    let variance = |&(sum, squares, count): &(f64, f64, f64)| {
-        (2.0 * count >= width as f64).then(|| ((squares - sum * sum / count) / (count - 1.0)).max(0.0))
+    let variance = |&(sum, squares, within, count): &(f64, f64, f64, f64)| {
+        (2.0 * count >= width as f64).then(|| ((squares - sum * sum / count) / (count - 1.0)).max(0.0) + within / count)
     };
     let known: Vec<Option<f64>> = sums.iter().map(variance).collect();
     let mut last = known.iter().flatten().next().copied()?;

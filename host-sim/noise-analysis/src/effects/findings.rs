@@ -1,7 +1,8 @@
 //! What was found: an effect with the correction that removes it from the samples, and the causes that a report lists.
 
 use crate::effects::Effect;
-use serde::Serialize;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// Highest probability that chance alone gives a name anywhere in the record of a channel: of six channels and a dozen kinds of effects it
@@ -16,6 +17,17 @@ pub struct ChannelEffect {
     pub effect: Effect,
     /// Position of the cause in the report's list of findings.
     pub finding: usize,
+}
+
+impl Serialize for ChannelEffect {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut written = serializer.serialize_struct("ChannelEffect", 4)?;
+        written.serialize_field("kind", self.effect.name())?;
+        written.serialize_field("parameters", &self.effect.parameters())?;
+        written.serialize_field("evidence", &self.effect)?;
+        written.serialize_field("finding", &self.finding)?;
+        written.end()
+    }
 }
 
 /// One cause of what the baseline noise model lacks, with every channel that shows it.

@@ -2,6 +2,7 @@
 
 use crate::OCTAVES;
 use crate::detectors::bias::BiasSensitivity;
+use crate::detectors::thermal_response::smoothed;
 use crate::record::estimators::RecordPart;
 use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
@@ -27,6 +28,8 @@ pub(crate) struct CovariateFit {
     data: RegressionData,
     /// `covariate` of each counts as in [`RegressionData`].
     sensitivities: Vec<Sensitivity>,
+    /// Time constant, s, over which the samples of each covariate are smoothed; 0 as measured.
+    smoothed_over_s: Vec<f64>,
     /// The channel's curve less the share of the covariates, and less correlated rounding errors.
     pub curve: Curve<OCTAVES>,
 }
@@ -82,12 +85,16 @@ impl CovariateFit {
         let data = RegressionData::new(part, channel, None);
         let mut sensitivities: Vec<Sensitivity> =
             data.regress(|regression| regression.sensitivities()).into_iter().collect();
+        let mut smoothed_over_s = vec![0.0; data.channels.len()];
         for (covariate, &regressor) in data.channels.iter().enumerate() {
-            let Some(BiasSensitivity { sensitivity: value, error, degrees_of_freedom }) = by_samples(regressor) else {
+            let Some(BiasSensitivity { sensitivity: value, error, degrees_of_freedom, smoothed_over_s: smoothed }) =
+                by_samples(regressor)
+            else {
                 let is_dropped = has_ramp && part.channels[regressor].quantity.is_environment();
                 sensitivities.retain(|known| known.covariate != covariate || !is_dropped);
                 continue;
             };
+            smoothed_over_s[covariate] = smoothed;
             let sensitivity = Sensitivity { covariate, value, error, degrees_of_freedom };
             match sensitivities.iter_mut().find(|known| known.covariate == covariate) {
                 Some(known) if known.error <= error => {}
@@ -96,7 +103,7 @@ impl CovariateFit {
             }
         }
         let curve = data.regress(|regression| regression.compensated(&sensitivities));
-        Self { data, sensitivities, curve }
+        Self { data, sensitivities, smoothed_over_s, curve }
     }
 
     /// The rounding errors of the channel's samples.
@@ -159,12 +166,19 @@ impl CovariateFit {
 
     /// `series` less the covariates times their sensitivities; `of_part` are the series of the same part's channels.
     ///
-    /// The covariates' own noise is added by this. Samples that a covariate lacks are missing in the result. `None` where
-    /// the channel depends on no covariate.
-    pub(crate) fn compensated_series(&self, series: &Series, of_part: &PerChannel<Series>) -> Option<Series> {
+    /// The noise of covariates that are not smoothed is added by this. Samples that a covariate lacks are missing in the result.
+    /// No sample before the sample period `middle` depends on a later one. `None` where the channel depends on no covariate.
+    pub(crate) fn compensated_series(
+        &self,
+        series: &Series,
+        of_part: &PerChannel<Series>,
+        middle: u64,
+    ) -> Option<Series> {
         let mut rest = series.clone();
         for (covariate, sensitivity) in self.sensitivities() {
-            let covariate = &of_part[covariate];
+            let (measured, over_s) = (&of_part[covariate], self.smoothed_over_s[sensitivity.covariate]);
+            let smoothed = (over_s > 0.0).then(|| smoothed(measured, over_s, middle));
+            let covariate = smoothed.as_ref().unwrap_or(measured);
             if covariate.slots == rest.slots {
                 subtract(&mut rest, sensitivity.value, covariate);
             } else {

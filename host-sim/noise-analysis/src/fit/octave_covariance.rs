@@ -31,7 +31,7 @@ const STEPS: usize = 8192;
 ///
 /// Beyond 512 samples the degrees of freedom are those of the model's mixture of noises, and the correlations those of pure
 /// noises.
-pub(crate) fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMatrix<f64> {
+fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMatrix<f64> {
     let period = model.sample_period();
     let step = 0.5 / period / STEPS as f64;
     let density = |index| model.density((f64::from(index) + 0.5) * step);

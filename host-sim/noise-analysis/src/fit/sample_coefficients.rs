@@ -11,6 +11,9 @@ use serde::Serialize;
 
 /// Largest difference of the durations of the samples and of the curve, as a part of that of the curve.
 const SAME_DURATION: f64 = 0.01;
+/// Segments of Welch's spectrum, half-overlapping ones not counted, and samples of the longest one: it resolves the nulls of 2 × 128 taps.
+const LEAST_SEGMENTS: usize = 16;
+const LONGEST_SEGMENT: usize = 2048;
 
 /// What the coefficients of a model are fitted to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -49,10 +52,28 @@ impl SamplesOfCurve<'_> {
         }
     }
 
+    /// Welch's spectrum of them, in which long gaps are left out, without lines at these frequencies in Hz; `None` where means of the samples
+    /// alone are kept.
+    pub(crate) fn averaged_spectrum(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
+        let of = |spectrum: &Welch, interpolated: f64| {
+            SampleSpectrum::of_welch(spectrum, self.rest.rounding(), lines, interpolated)
+        };
+        if let Some(spectrum) = self.spectrum {
+            return Some(of(spectrum, curve.points().first().map_or(0.0, |point| point.replaced)));
+        }
+        let length = (self.rest.present() / LEAST_SEGMENTS).clamp(1, LONGEST_SEGMENT).ilog2();
+        let spectrum = self.are_samples(curve).then(|| Welch::estimate(self.rest, 1 << length))?;
+        Some(of(&spectrum?, self.rest.interpolated().1))
+    }
+
     /// The spectrum of their longest part without a gap that interpolation does not close; `None` where the means alone are kept.
     fn spectrum_without_gaps(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
-        let are_samples = self.rest.sample_period() < 1.5 * curve.sample_period();
-        are_samples.then(|| SampleSpectrum::of_samples(&self.rest.longest_interpolated(), lines))?
+        self.are_samples(curve).then(|| SampleSpectrum::of_samples(&self.rest.longest_interpolated(), lines))?
+    }
+
+    /// Whether they are the samples of `curve` and not their means.
+    fn are_samples(&self, curve: &Curve<OCTAVES>) -> bool {
+        self.rest.sample_period() < 1.5 * curve.sample_period()
     }
 }
 

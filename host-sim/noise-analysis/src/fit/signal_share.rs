@@ -79,18 +79,21 @@ impl SignalShare {
         within
     }
 
-    /// The same with amplitudes from their lower bounds to their upper ones.
+    /// The same with amplitudes from their lower bounds to their upper ones, each signal's by itself.
     pub(crate) fn within_bounds(&self) -> impl Iterator<Item = Self> {
         let factor = |[low, high]: [f64; 2], step: f64| {
             if step < 0.0 { 1.0 + step * (1.0 - low) } else { 1.0 + step * (high - 1.0) }
         };
-        STEPS.into_iter().map(move |step| {
+        let steps = |is_there: bool| if is_there { &STEPS[..] } else { &[0.0] };
+        let of_run = steps(self.run.is_some());
+        let steps = steps(self.periodic.is_some()).iter().flat_map(move |of| of_run.iter().map(move |run| (*of, *run)));
+        steps.map(move |(of_periodic, of_run)| {
             let mut scaled = self.clone();
             if let Some(Harmonics { amplitudes, bounds, .. }) = &mut scaled.periodic {
-                amplitudes.iter_mut().for_each(|amplitude| *amplitude *= factor(*bounds, step));
+                amplitudes.iter_mut().for_each(|amplitude| *amplitude *= factor(*bounds, of_periodic));
             }
             if let Some(Run { amplitude, bounds, .. }) = &mut scaled.run {
-                *amplitude *= factor(*bounds, step);
+                *amplitude *= factor(*bounds, of_run);
             }
             scaled
         })
@@ -139,7 +142,7 @@ fn bounds(amplitude: BoundedEstimate) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Run, SignalShare};
+    use super::{Harmonics, Run, SignalShare};
     use crate::OVERLAP;
     use allan_core::Cascade;
     use std::f64::consts::TAU;
@@ -172,6 +175,23 @@ mod tests {
                 assert!((found / expected - 1.0).abs() < 0.01, "{frequencies:?}, {n}: {found} {expected}");
             }
         }
+    }
+
+    /// Where one amplitude is at its lower bound and the other at its upper one, both are among those that are tried.
+    #[test]
+    fn the_amplitudes_of_two_signals_are_tried_independently() {
+        let of = |periodic: f64, run: f64| SignalShare {
+            periodic: Some(Harmonics { frequency: 0.02, amplitudes: vec![periodic], bounds: [0.5, 1.5] }),
+            run: Some(Run { amplitude: run, bounds: [0.8, 1.2], frequencies: [3.0, 5.0] }),
+        };
+        let expected = of(0.5, 1.2);
+        let is_near = |tried: SignalShare| {
+            let [found, expected] = [8, 512].map(|n| [&tried, &expected].map(|of| of.avar(n, PERIOD_S)));
+            [found, expected].iter().all(|[found, expected]| (found / expected - 1.0).abs() < 1e-9)
+        };
+        assert!(of(1.0, 1.0).within_bounds().any(is_near));
+        // A signal that is missing needs no steps.
+        assert_eq!(SignalShare { periodic: None, ..of(1.0, 1.0) }.within_bounds().count(), 5);
     }
 
     /// A line that is alone in a record has all of its variance: a tenth is left.

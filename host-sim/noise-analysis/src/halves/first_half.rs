@@ -77,7 +77,7 @@ impl FirstHalf {
         });
         let channels = per_channel(series.ids(), |channel| {
             let (fit, own) = (&part.channels[channel].fit, &series[channel]);
-            let followed = fit.covariates.compensated_series(own, &series);
+            let followed = fit.covariates.compensated_series(own, &series, middle);
             let curves = || EpochCurves::from_series(followed.as_ref().unwrap_or(own), middle);
             let curves = record.is_traced(channel).then(curves).flatten()?;
             let curves = curves.in_samples(&record.channels[channel].samples).without(&fit.signals);
@@ -97,7 +97,7 @@ impl FirstHalf {
             let (bias, curves) = (&biases[channel], &estimators.recorded[0]);
             let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
             let own = preprocessing.series(whole.measurement(), channel, Exclusion::Nothing).before(middle);
-            let rest = covariates.compensated_series(&own, &halves).unwrap_or(own);
+            let rest = covariates.compensated_series(&own, &halves, middle).unwrap_or(own);
             let ChannelFit { covariates, before, .. } = ChannelFit::fit_baseline(covariates);
             let is_screened = half.channels[channel].samples.is_screened;
             let spectrum = half.spectrum_within(channel, 0..middle).filter(|_| !is_screened);

@@ -1,7 +1,6 @@
 //! A recording before and after models are fitted to all of it: what the samples of each channel show, and the effects by both.
 
 use crate::detectors::level_change;
-use crate::detectors::noise_grid::NoiseGrids;
 use crate::effects::{Effect, NoisyInterval};
 use crate::fit::noise_terms::filter_length_s;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
@@ -32,14 +31,14 @@ pub(crate) struct PreprocessedRecord<'a> {
 impl<'a> PreprocessedRecord<'a> {
     /// What the samples of `record` show.
     pub(crate) fn new(record: &'a CondensedRecord<'a>) -> Self {
-        let preprocessing = Preprocessing::detect(record, None, &NoiseGrids::default());
+        let preprocessing = Preprocessing::detect(record, None);
         let estimators = RecordEstimators::estimate(record, &preprocessing);
         Self::with(record, preprocessing, estimators)
     }
 
     /// The same, and the estimators of both halves by what the `first_half` shows.
     pub(crate) fn with_halves(record: &'a CondensedRecord<'a>, first_half: &CondensedRecord) -> (Self, HalfEstimators) {
-        let preprocessing = Preprocessing::detect(record, Some(first_half), &NoiseGrids::default());
+        let preprocessing = Preprocessing::detect(record, Some(first_half));
         let (estimators, halves) = RecordEstimators::estimate_with_halves(record, first_half, &preprocessing);
         (Self::with(record, preprocessing, estimators), halves)
     }

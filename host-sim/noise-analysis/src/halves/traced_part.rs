@@ -228,7 +228,7 @@ impl ChannelTrace {
     ) -> Self {
         let (own, bias) = (&samples.series[channel], &samples.biases[channel]);
         let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
-        let compensated = covariates.compensated_series(own, samples.series);
+        let compensated = covariates.compensated_series(own, samples.series, own.span.end);
         let rest = UniformSeries::from_series(compensated.as_ref().unwrap_or(own));
         let rest = rest.with_rounding(covariates.rounding().clone());
         let samples_per_mean = samples.record.samples_per_mean;
@@ -270,22 +270,19 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
     let decimation = profile.internal_rate_hz * curves.sample_period();
     let inertial: Vec<ChannelId> =
         curves.channels.ids().filter(|&channel| curves.channels[channel].quantity.is_inertial()).collect();
-    let filtered: Vec<FilteredChannel> = inertial
-        .iter()
-        .map(|&channel| {
-            let trace = &channels[channel];
-            let (fit, resolution) = (&trace.fit, curves.resolution(channel));
-            let lines = || trace.lines.iter().map(|line| line.frequency.value).collect();
-            FilteredChannel {
-                name: curves.channels[channel].name,
-                curve: &fit.curve,
-                model: fit.after(),
-                rounding: fit.covariates.rounding(),
-                is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
-                samples: trace.samples_of_noise().map(|samples| (samples, lines())),
-            }
+    let filtered = |&channel: &ChannelId| {
+        let trace = &channels[channel];
+        Some(FilteredChannel {
+            name: curves.channels[channel].name,
+            curve: &trace.fit.curve,
+            model: trace.fit.after(),
+            is_dithered: trace.fit.is_dithered(profile, curves.resolution(channel), DITHERED_OCTAVES),
+            // A line whose frequency runs is in few of the bands at a time.
+            samples: trace.samples_of_noise().or_else(|| trace.samples())?,
+            lines: trace.lines.iter().map(|line| line.frequency.value).collect(),
         })
-        .collect();
+    };
+    let filtered: Vec<FilteredChannel> = inertial.iter().filter_map(filtered).collect();
     let filter = part_filter::estimate(&filtered, (&profile.filters, profile.may_be_low_pass), decimation);
     let mut dithered = vec![None; curves.channels.iter().len()];
     inertial.iter().zip(&filtered).for_each(|(channel, of)| dithered[channel.position()] = Some(of.is_dithered));

@@ -34,6 +34,8 @@ pub(crate) type FasterLines = Arc<LazyLock<Vec<MergedLine>, Box<dyn FnOnce() -> 
 #[derive(Clone)]
 pub(crate) struct CondensedChannel {
     pub samples: SampleCurves,
+    /// Variance of the samples within each mean, in the square of the channel's unit; empty if all samples are kept.
+    pub variances: Arc<[f64]>,
     pub counts_per_step: u32,
     /// True if spikes can be sought: not in means, and not in values that are cut off.
     pub can_show_spikes: bool,
@@ -65,6 +67,7 @@ impl<'a> CondensedRecord<'a> {
             let resolution = f64::from(counts_per_step) * channel.profile.lsb;
             CondensedChannel {
                 samples: SampleCurves::of_all(&measurement, id, resolution),
+                variances: Arc::default(),
                 counts_per_step,
                 can_show_spikes: channel.profile.quantity.is_inertial() && !shown.is_saturated(id),
                 faster_lines: faster_lines(Vec::new),

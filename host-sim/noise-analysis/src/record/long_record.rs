@@ -342,6 +342,7 @@ impl LongRecordReader {
                     period_s,
                     lsb: profile.lsb,
                 },
+                variances: screened.means.variances.iter().map(|variance| variance * profile.lsb.powi(2)).collect(),
                 counts_per_step: 1,
                 can_show_spikes: false,
                 faster_lines: lines_of(stacked, description.periods),
@@ -417,7 +418,10 @@ struct Means {
     steps_log2: u32,
     /// In steps; [`MISSING`] without enough samples.
     counts: Vec<i32>,
+    /// Variance of the samples of each mean about it, counts²; 0 without enough samples.
+    variances: Vec<f64>,
     sum: i64,
+    squares: i128,
     present: u64,
 }
 
@@ -426,13 +430,23 @@ impl Means {
     fn new(samples_per_mean: u64, most: u64, largest: u32) -> Self {
         let room = (LARGEST_MEAN / (4.0 * f64::from(largest.max(1)))).max(1.0).log2() as u32;
         let steps_log2 = MEAN_STEPS_LOG2.min(room);
-        Self { samples_per_mean, most, steps_log2, counts: Vec::new(), sum: 0, present: 0 }
+        Self {
+            samples_per_mean,
+            most,
+            steps_log2,
+            counts: Vec::new(),
+            variances: Vec::new(),
+            sum: 0,
+            squares: 0,
+            present: 0,
+        }
     }
 
     fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
         for (slot, count) in channel.used_samples(slots) {
             self.end_before(slot / self.samples_per_mean);
             self.sum += i64::from(count);
+            self.squares += i128::from(count).pow(2);
             self.present += 1;
         }
         // The last sample period completes the last mean.
@@ -446,9 +460,12 @@ impl Means {
         let number = number.min(self.most);
         while (self.counts.len() as u64) < number {
             let is_filled = self.present as f64 >= LEAST_FILL * self.samples_per_mean as f64;
-            let mean = self.sum as f64 / self.present.max(1) as f64 * f64::from(1_u32 << self.steps_log2);
+            let present = self.present.max(1);
+            let mean = self.sum as f64 / present as f64 * f64::from(1_u32 << self.steps_log2);
+            let squares = self.squares * i128::from(present) - i128::from(self.sum).pow(2);
             self.counts.push(if is_filled { mean.round().clamp(-LARGEST_MEAN, LARGEST_MEAN) as i32 } else { MISSING });
-            (self.sum, self.present) = (0, 0);
+            self.variances.push(if is_filled { squares as f64 / (present as f64).powi(2) } else { 0.0 });
+            (self.sum, self.squares, self.present) = (0, 0, 0);
         }
     }
 }

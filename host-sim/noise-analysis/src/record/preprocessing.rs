@@ -8,7 +8,6 @@ use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::knock_search::{self, LoudStretches, SearchedChannel, slots_within};
 use crate::detectors::knocks::Knock;
-use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::output_range::find_noise_below_count;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
@@ -21,7 +20,7 @@ use crate::samples::rounding::NEIGHBOURING_COUNTS;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
-use crate::spectra::force_regression::force_sensitivities;
+use crate::spectra::force_regression::Forces;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::cell::LazyCell;
 use std::sync::Arc;
@@ -63,11 +62,7 @@ struct ChannelBias {
 
 impl Preprocessing {
     /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels, and in the `first_half` alone.
-    pub(crate) fn detect(
-        record: &CondensedRecord,
-        first_half: Option<&CondensedRecord>,
-        noise_grids: &NoiseGrids,
-    ) -> Self {
+    pub(crate) fn detect(record: &CondensedRecord, first_half: Option<&CondensedRecord>) -> Self {
         let measurement = record.means.as_ref();
         let slots: Arc<[u64]> = measurement.slots.as_slice().into();
         let by_first_half = || {
@@ -76,10 +71,10 @@ impl Preprocessing {
                 // Repeated samples of the second half are dropped by either exclusion.
                 let repeated = record.repeated.iter().copied().filter(|slot| *slot >= middle);
                 let repeated = half.repeated.iter().copied().chain(repeated).collect();
-                Shown::by_first_half(record, half, &slots, repeated, noise_grids)
+                Shown::by_first_half(record, half, &slots, repeated)
             })
         };
-        let by_whole = || Shown::by_whole(record, &slots, noise_grids);
+        let by_whole = || Shown::by_whole(record, &slots);
         let (by_first_half, (by_whole, effects)) = parallel::both(by_first_half, by_whole);
         Self { slots, by_whole, by_first_half, effects }
     }
@@ -196,11 +191,7 @@ fn all_measured(
 
 impl Shown {
     /// The findings in the whole record, and the effects of each channel.
-    fn by_whole(
-        record: &CondensedRecord,
-        slots: &Arc<[u64]>,
-        noise_grids: &NoiseGrids,
-    ) -> (Self, PerChannel<Vec<Effect>>) {
+    fn by_whole(record: &CondensedRecord, slots: &Arc<[u64]>) -> (Self, PerChannel<Vec<Effect>>) {
         let measurement = record.means.as_ref();
         let counts_per_step = record.channels.map(|of| of.counts_per_step);
         let series = all_measured(measurement, slots, &counts_per_step);
@@ -208,6 +199,7 @@ impl Shown {
         let once = series.map(|of| of.clone().without(&record.repeated));
         // Covariates, without their own knocks.
         let quiet = without_knocks(&once, &loud);
+        let forces = forces(measurement, &quiet);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
                 return (ShownInChannel::default(), Vec::new());
@@ -216,7 +208,7 @@ impl Shown {
             let can_show_spikes = record.channels[channel].can_show_spikes;
             let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], by_itself)).flatten();
             let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
-            let (bias, found) = bias_of(measurement, channel, (&once, &quiet), &excluded, noise_grids);
+            let (bias, found) = bias_of(record, channel, (&once, &quiet), &forces, &excluded);
             let BiasChanges { step, ramp, responses, .. } = found;
             let events = knock_detections(measurement, &loud, &once[channel], channel).into_iter().chain(spikes);
             let events = events.chain(step).chain(ramp).map(|detection| detection.effect);
@@ -234,7 +226,6 @@ impl Shown {
         first_half: &CondensedRecord,
         slots: &Arc<[u64]>,
         repeated: Vec<u64>,
-        noise_grids: &NoiseGrids,
     ) -> Self {
         let measurement = record.means.as_ref();
         let middle = measurement.middle();
@@ -244,6 +235,7 @@ impl Shown {
         let loud = loud_stretches(first_half, &repeated, halves.each_ref());
         let once = halves.map(|half| half.map(|of| of.clone().without(&repeated)));
         let [quiet, quiet_second] = [0, 1].map(|half| without_knocks(&once[half], &loud[half]));
+        let forces = forces(measurement, &quiet);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
                 return ShownInChannel::default();
@@ -253,7 +245,7 @@ impl Shown {
                 rule.as_ref().map(|rule| rule.slots(series, &loud.by_itself)).unwrap_or_default()
             };
             let of_first = spikes(&quiet[channel], &loud[0][channel]);
-            let (bias, _) = bias_of(measurement, channel, (&once[0], &quiet), &of_first, noise_grids);
+            let (bias, _) = bias_of(record, channel, (&once[0], &quiet), &forces, &of_first);
             let knocks = [0, 1].map(|half| slots_within(&once[half][channel], &loud[half][channel].knocks)).concat();
             let of_second = spikes(&quiet_second[channel], &loud[1][channel]);
             ShownInChannel { knocks, spikes: [of_first, of_second].concat(), bias }
@@ -271,12 +263,13 @@ impl ShownInChannel {
 
 /// Changes of the bias of `channel` without its spikes; `quiet` are all `series` without their knocks.
 fn bias_of(
-    measurement: &Measurement,
+    record: &CondensedRecord,
     channel: ChannelId,
     (series, quiet): (&PerChannel<Series>, &PerChannel<Series>),
+    forces: &Forces,
     spikes: &[u64],
-    noise_grids: &NoiseGrids,
 ) -> (ChannelBias, BiasChanges) {
+    let measurement = record.means.as_ref();
     let regressors: Vec<ChannelId> =
         measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
     let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
@@ -287,22 +280,21 @@ fn bias_of(
     });
     let least_step = || *smallest_step;
     let own = quiet[channel].clone().without(spikes);
-    let accelerations = accelerations(measurement, series, channel);
-    let found = bias::find(&without_lines(own.clone()), &others, &accelerations, noise_grids, &least_step);
+    let accelerations = accelerations(record, series, channel);
+    let found = bias::find(&without_lines(own.clone()), &others, &accelerations, &least_step);
     let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
     // Differences, or the force at each frequency, determine a sensitivity to motion better.
-    let is_force = |at: &usize| measurement[regressors[*at]].profile.quantity == Quantity::SpecificForce;
-    let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
-    let forces: Vec<usize> = (0..regressors.len()).filter(is_force).collect();
-    let of_forces: Vec<&Series> = forces.iter().map(|&at| others[at]).collect();
-    let by_force = force_sensitivities(&own, &of_forces);
-    let slow = found.sensitivities.iter().filter(|(at, _)| is_slow(regressors[*at])).copied();
-    let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (forces[place], of)));
+    let is_slow = |(regressor, _): &(ChannelId, _)| measurement[*regressor].profile.quantity.is_environment();
+    let slow = found.sensitivities.iter().map(|&(at, of)| (regressors[at], of)).filter(is_slow);
+    let is_rate = measurement[channel].profile.quantity == Quantity::AngularRate;
+    let by_force = if is_rate { forces.sensitivities_of(&own) } else { Vec::new() };
+    let accelerometers: Vec<ChannelId> = measurement.of_quantity(Quantity::SpecificForce).collect();
+    let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (accelerometers[place], of)));
     let bias = ChannelBias {
         offset: offset(&found),
         has_ramp: found.ramp.is_some(),
         responses: found.responses.clone(),
-        sensitivities: sensitivities.map(|(at, of)| (regressors[at], of)).collect(),
+        sensitivities: sensitivities.collect(),
     };
     (bias, found)
 }
@@ -361,16 +353,24 @@ fn loud_stretches<const PARTS: usize>(
     })
 }
 
+/// The forces that the gyroscopes may follow.
+fn forces(measurement: &Measurement, quiet: &PerChannel<Series>) -> Forces {
+    let has_rates = measurement.of_quantity(Quantity::AngularRate).next().is_some();
+    let forces = measurement.of_quantity(Quantity::SpecificForce).filter(|_| has_rates).map(|of| &quiet[of]);
+    Forces::new(&forces.collect::<Vec<&Series>>())
+}
+
 /// The accelerometers that may shake `channel`.
 fn accelerations<'s>(
-    measurement: &Measurement,
+    record: &'s CondensedRecord,
     series: &'s PerChannel<Series>,
     channel: ChannelId,
 ) -> Vec<Acceleration<'s>> {
+    let measurement = record.means.as_ref();
     let acceleration = |of: ChannelId| {
         let profile = &measurement[of].profile;
         let largest = largest_sensitivity(measurement[channel].profile.range, profile.range);
-        Acceleration { name: profile.name, series: &series[of], largest }
+        Acceleration { name: profile.name, series: &series[of], variances: &record.channels[of].variances, largest }
     };
     measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
 }

@@ -6,8 +6,8 @@
 //! effects of the first half alone ──────────────────────────────────────────┴► validation
 //! ```
 
+mod comb;
 mod grouping;
-mod harmonic_series;
 mod line;
 mod periodic;
 mod shares;

@@ -451,7 +451,7 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Optio
 fn modulated_line(line: &MergedLine, modulation: &Modulation, unit: &'static str) -> Effect {
     ModulatedLine {
         frequency_hz: line.frequency.bounds(),
-        amplitude: line.deviation.bounds().scaled(SQRT_2 * modulation.of_line).in_unit(unit),
+        amplitude: line.deviation.bounds().scaled(SQRT_2).in_unit(unit),
         depth: modulation.depth.bounds(),
         period_s: modulation.frequency.bounds().inverse(),
         of_phase: modulation.of_phase,

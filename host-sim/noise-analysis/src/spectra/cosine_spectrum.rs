@@ -6,14 +6,14 @@
 //! random walk, which does not. The expected square of each coefficient follows from the covariance of the block means
 //! (N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23, 1974).
 
+use super::block_cosines::{flicker_squares, markov_squares, walk_squares};
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
+use super::transforms::cosine_transform;
 use super::whittle::SpectralBand;
-use crate::detectors::noise_grid::markov_covariance;
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
-use std::f64::consts::PI;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 /// Blocks of a record.
 const BLOCKS: usize = 256;
@@ -62,18 +62,12 @@ impl CosineSpectrum {
             return None;
         }
         let mut latest = mean;
-        let mut filled = [0.0; BLOCKS];
-        for (filled, value) in filled.iter_mut().zip(blocks.values()) {
-            if value.is_finite() {
-                latest = *value;
-            }
-            *filled = latest - mean;
-        }
-        let square = |order: usize| {
-            let terms = filled.iter().enumerate().map(|(at, value)| value * cosine(order * (2 * at + 1)));
-            2.0 / BLOCKS as f64 * terms.sum::<f64>().powi(2)
-        };
-        let squares: Vec<f64> = bands().map(|band| mean_over(&band, square)).collect();
+        let filled = blocks.values()[..BLOCKS].iter().map(|value| {
+            latest = if value.is_finite() { *value } else { latest };
+            latest - mean
+        });
+        let squares = cosine_transform(filled).into_iter().skip(1).map(|of| 2.0 / BLOCKS as f64 * of * of);
+        let squares = in_bands(&squares.collect::<Vec<f64>>());
         squares.iter().all(|square| *square > 0.0).then(|| Self { block_s: blocks.sample_period(), squares })
     }
 
@@ -119,57 +113,32 @@ impl CosineSpectrum {
     }
 }
 
-/// The cosine of a multiple of π/512: half the phase by which the coefficient of the first order grows from block to block.
-fn cosine(multiple: usize) -> f64 {
-    static COSINES: OnceLock<Vec<f64>> = OnceLock::new();
-    let value = |multiple: usize| (PI * multiple as f64 / (2 * BLOCKS) as f64).cos();
-    COSINES.get_or_init(|| (0..4 * BLOCKS).map(value).collect())[multiple % (4 * BLOCKS)]
+/// Means over each band of a value per order from 1 on.
+fn in_bands(by_order: &[f64]) -> Vec<f64> {
+    bands().map(|band| by_order[band.start - 1..band.end - 1].iter().sum::<f64>() / band.len() as f64).collect()
 }
 
-/// The sine of such a multiple.
-fn sine(multiple: usize) -> f64 {
-    cosine(multiple + 3 * BLOCKS)
-}
-
-/// The mean of a function of the order over a band.
-fn mean_over(band: &Range<usize>, of: impl Fn(usize) -> f64) -> f64 {
-    band.clone().map(of).sum::<f64>() / band.len() as f64
-}
-
-/// Expected mean squares in each band of white, flicker and random-walk noise, each up to a factor.
+/// Expected mean squares in each band of white, flicker and random-walk noise of density, B and steps per block of 1.
 fn noise_shapes() -> &'static [[f64; 3]] {
-    static SHAPES: OnceLock<Vec<[f64; 3]>> = OnceLock::new();
-    SHAPES.get_or_init(|| {
-        // The covariance of means over blocks of 1 whose second integral is `integral`.
-        let of_blocks = |integral: fn(f64) -> f64, lag: usize| {
-            let lag = lag as f64;
-            integral(lag + 1.0) - 2.0 * integral(lag) + integral(lag - 1.0)
-        };
-        // Minus half the mean square of a difference, without the constant, which is in no coefficient: ln of the lag of flicker
-        // noise, half the lag of a random walk with steps of variance 1 a block.
-        let flicker = |x: f64| if x == 0.0 { 0.0 } else { -0.5 * x * x * (x.abs().ln() - 1.5) };
-        let walk = |x: f64| -x.abs().powi(3) / 12.0;
-        let white = expected_squares(|lag| if lag == 0 { 1.0 } else { 0.0 });
-        let flicker = expected_squares(|lag| of_blocks(flicker, lag));
-        let walk = expected_squares(|lag| of_blocks(walk, lag));
-        white.into_iter().zip(flicker).zip(walk).map(|((white, flicker), walk)| [white, flicker, walk]).collect()
-    })
+    static SHAPES: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
+        let [flicker, walk] = [flicker_squares(BLOCKS), walk_squares(BLOCKS)].map(|squares| in_bands(&squares));
+        flicker.into_iter().zip(walk).map(|(flicker, walk)| [1.0, flicker, walk]).collect()
+    });
+    &SHAPES
 }
 
 /// Expected square of the cosine coefficient of flicker noise of this order over its density at the frequency of the cosine: little of
 /// the lower frequencies leaks into the lowest coefficients, and nothing to speak of into others.
 pub(super) fn flicker_leakage(order: f64) -> f64 {
-    static RATIOS: OnceLock<Vec<f64>> = OnceLock::new();
-    let ratios = RATIOS.get_or_init(|| {
+    static RATIOS: LazyLock<Vec<f64>> = LazyLock::new(|| {
         let single = bands().zip(noise_shapes()).take_while(|(band, _)| band.len() == 1);
         let ratio = |(band, [_, flicker, _]): (Range<usize>, &[f64; 3])| {
-            // The shape is that of a noise whose covariance is −ln of the lag, π times that of B = 1.
             let frequency = band.start as f64 / (2 * BLOCKS) as f64;
-            flicker / PI / NoiseTerm::BiasInstability.process().density(frequency, 1.0)
+            flicker / NoiseTerm::BiasInstability.process().density(frequency, 1.0)
         };
         single.map(ratio).collect()
     });
-    ratios.get((order.round() as usize).saturating_sub(1)).copied().unwrap_or(1.0)
+    RATIOS.get((order.round() as usize).saturating_sub(1)).copied().unwrap_or(1.0)
 }
 
 /// A Markov process of variance 1.
@@ -181,34 +150,16 @@ struct MarkovShape {
 }
 
 fn markov_shapes() -> &'static [MarkovShape] {
-    static SHAPES: OnceLock<Vec<MarkovShape>> = OnceLock::new();
-    SHAPES.get_or_init(|| {
-        let of_time = |time: f64| {
-            let covariances: Vec<f64> = markov_covariance(time).take(BLOCKS).collect();
-            MarkovShape { time, expected: expected_squares(|lag| covariances[lag]) }
-        };
+    static SHAPES: LazyLock<Vec<MarkovShape>> = LazyLock::new(|| {
+        let of_time = |time: f64| MarkovShape { time, expected: in_bands(&markov_squares(BLOCKS, time)) };
         time_constants(SHORTEST, LONGEST).map(of_time).collect()
-    })
-}
-
-/// Expected mean squares of the coefficients in each band, of blocks with this covariance at a lag.
-fn expected_squares(covariance: impl Fn(usize) -> f64) -> Vec<f64> {
-    let covariances: Vec<f64> = (0..BLOCKS).map(covariance).collect();
-    let of_order = |order: usize| {
-        // Σ of the products of two values of the cosine at this lag.
-        let products = |lag: usize| {
-            let (lagged, sines) = (2 * order * lag, sine(2 * order * lag) / sine(2 * order));
-            0.5 * ((BLOCKS - lag) as f64 * cosine(lagged) - sines)
-        };
-        let of_lag = |(lag, covariance): (usize, &f64)| if lag == 0 { 1.0 } else { 2.0 } * covariance * products(lag);
-        2.0 / BLOCKS as f64 * covariances.iter().enumerate().map(of_lag).sum::<f64>()
-    };
-    bands().map(|band| mean_over(&band, of_order)).collect()
+    });
+    &SHAPES
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BLOCKS, CosineSpectrum, bands, expected_squares, noise_shapes};
+    use super::{BLOCKS, CosineSpectrum, bands, noise_shapes};
     use crate::samples::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -307,11 +258,5 @@ mod tests {
                 "{band:?}: {ratio}"
             );
         }
-    }
-
-    #[test]
-    fn white_noise_has_the_same_square_in_every_coefficient() {
-        let squares = expected_squares(|lag| if lag == 0 { 3.0 } else { 0.0 });
-        assert!(squares.iter().all(|square| (square - 3.0).abs() < 1e-9));
     }
 }

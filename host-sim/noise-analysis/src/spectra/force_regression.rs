@@ -28,15 +28,12 @@ const TURNS: usize = 3;
 /// Groups of orders, slow to fast, that have to agree.
 const GROUPS: usize = 4;
 
-/// The sensitivities of `rate`, in its unit per g, to those of the `forces` that it follows, by their positions.
-pub(crate) fn force_sensitivities(rate: &Series, forces: &[&Series]) -> Vec<(usize, BiasSensitivity)> {
-    let Some(regression) = ForceRegression::new(rate, forces) else { return Vec::new() };
-    regression.sensitivities().unwrap_or_default()
-}
+/// The forces of a record that move, transformed once for all of its gyroscopes.
+pub(crate) struct Forces(Vec<Force>);
 
-struct ForceRegression {
+struct ForceRegression<'a> {
     rate: Vec<f64>,
-    forces: Vec<Force>,
+    forces: Vec<&'a Force>,
 }
 
 struct Force {
@@ -61,18 +58,26 @@ struct Solution {
     information: DMatrix<f64>,
 }
 
-impl ForceRegression {
+impl Forces {
+    pub(crate) fn new(forces: &[&Series]) -> Self {
+        let force = |(place, series): (usize, &&Series)| Force::new(place, transformed(series)?);
+        Self(forces.iter().enumerate().filter_map(force).collect())
+    }
+
+    /// The sensitivities of `rate`, in its unit per g, to those of the forces that it follows, by their positions.
+    pub(crate) fn sensitivities_of(&self, rate: &Series) -> Vec<(usize, BiasSensitivity)> {
+        let Some(regression) = ForceRegression::new(rate, self) else { return Vec::new() };
+        regression.sensitivities().unwrap_or_default()
+    }
+}
+
+impl<'a> ForceRegression<'a> {
     /// `None` for too few samples, a gap, or no motion.
-    fn new(rate: &Series, forces: &[&Series]) -> Option<Self> {
-        let size = (rate.span.end - rate.span.start).div_ceil(MOST_VALUES as u64).max(1) as usize;
-        let rate = transformed(rate, size)?;
-        let force = |(place, series): (usize, &&Series)| {
-            let motion = transformed(series, size).filter(|motion| motion.len() == rate.len())?;
-            Force::new(place, motion)
-        };
-        let mut forces: Vec<Force> = forces.iter().enumerate().filter_map(force).collect();
+    fn new(rate: &Series, Forces(forces): &'a Forces) -> Option<Self> {
+        let rate = if forces.is_empty() { None } else { transformed(rate) }?;
         let variances = around(&rate);
-        forces.retain(|of| of.orders(&variances) >= FEWEST_ORDERS);
+        let moves = |of: &&Force| of.motion.len() == rate.len() && of.orders(&variances) >= FEWEST_ORDERS;
+        let forces: Vec<&Force> = forces.iter().filter(moves).collect();
         (!forces.is_empty()).then_some(Self { rate, forces })
     }
 
@@ -105,10 +110,13 @@ impl ForceRegression {
         }
         let freedom = self.forces.iter().map(|of| of.orders(&variances)).fold(f64::INFINITY, f64::min);
         let covariance = found.information.try_inverse()?;
-        let of_axis = |(at, force): (usize, &Force)| {
+        let of_axis = |(at, force): (usize, &&Force)| {
             let (sensitivity, error) = (found.sensitivities[at], covariance[(at, at)].sqrt());
             let is_shown = sensitivity.abs() > NORMAL_975 * error;
-            is_shown.then_some((force.place, BiasSensitivity { sensitivity, error, degrees_of_freedom: freedom }))
+            is_shown.then_some((
+                force.place,
+                BiasSensitivity { sensitivity, error, degrees_of_freedom: freedom, smoothed_over_s: 0.0 },
+            ))
         };
         Some(self.forces.iter().enumerate().filter_map(of_axis).collect())
     }
@@ -190,8 +198,9 @@ impl Equations {
     }
 }
 
-/// Cosine transform of means of `size` samples about their straight line, 0 if missing; `None` with a long gap.
-fn transformed(series: &Series, size: usize) -> Option<Vec<f64>> {
+/// Cosine transform of means of samples about their straight line, 0 if missing; `None` with a long gap.
+fn transformed(series: &Series) -> Option<Vec<f64>> {
+    let size = (series.span.end - series.span.start).div_ceil(MOST_VALUES as u64).max(1) as usize;
     let uniform = UniformSeries::from_series(series);
     let is_whole = uniform.values().len() as u64 == series.span.end - series.span.start;
     if !is_whole || uniform.values().len() < FEWEST_VALUES * size {
@@ -270,7 +279,7 @@ mod tests {
         let forces = motions.each_ref().map(|of| series(sum(of, 1.0, &noise(&mut random, 0.01, 0.0)), "g"));
         let line: Vec<f64> = (0..SAMPLES).map(|at| 3.0 * (TAU * at as f64 * PERIOD_S).sin()).collect();
         let rate = sum(&sum(&noise(&mut random, 1.0, 0.002), 1.0, &line), 1.0, &followed(&motions));
-        force_sensitivities(&series(rate, "deg/s"), &forces.each_ref())
+        Forces::new(&forces.each_ref()).sensitivities_of(&series(rate, "deg/s"))
     }
 
     #[test]
@@ -294,7 +303,7 @@ mod tests {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let forces = [0.001, 0.01, 0.1].map(|step| series(noise(&mut random, 0.01, step), "g"));
             let rate = series(noise(&mut random, 1.0, 0.1), "deg/s");
-            assert_eq!(force_sensitivities(&rate, &forces.each_ref()), []);
+            assert_eq!(Forces::new(&forces.each_ref()).sensitivities_of(&rate), []);
         }
     }
 
@@ -302,7 +311,7 @@ mod tests {
     fn short_and_constant_channels_have_no_sensitivity() {
         for values in [Vec::new(), vec![1.0], vec![0.0; SAMPLES]] {
             let channel = series(values, "g");
-            assert_eq!(force_sensitivities(&channel, &[&channel, &channel]), []);
+            assert_eq!(Forces::new(&[&channel, &channel]).sensitivities_of(&channel), []);
         }
     }
 

@@ -2,8 +2,10 @@
 
 use super::line_envelope::{MOST_PERIODS, Modulation, is_same};
 use super::line_models::Sine;
-use super::whitened_spectrum::{Resonance, SpectralLine, sine_line};
+use super::whitened_spectrum::{Resonance, SpectralLine};
+use crate::bounds::MeasuredValue;
 use crate::samples::uniform_series::UniformSeries;
+use std::f64::consts::PI;
 
 /// Refits of neighbouring sinusoids in turn.
 const REFITS: usize = 3;
@@ -18,12 +20,14 @@ pub(super) struct FoundSines {
     found: Vec<FoundSine>,
 }
 
-#[derive(Clone)]
-struct FoundSine {
-    line: SpectralLine,
-    sine: Sine,
+/// A sinusoid that stands out of the noise.
+#[derive(Clone, Copy)]
+pub(super) struct FoundSine {
+    pub sine: Sine,
     /// Noise around it, unit²/Hz.
-    density: f64,
+    pub density: f64,
+    /// Probability of such a peak at any frequency, without lines.
+    pub p_value: f64,
 }
 
 impl FoundSines {
@@ -31,15 +35,10 @@ impl FoundSines {
         self.found.len()
     }
 
-    /// Takes a sinusoid, a `line` of the spectrum, out of the `series`; returns the rest.
-    pub(super) fn take(&mut self, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
-        self.take_over(2.0 * sine.density(series) / line.statistic, line, sine, series)
-    }
-
-    /// [`take`](Self::take) with a known noise density.
-    fn take_over(&mut self, density: f64, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
-        self.found.push(FoundSine { line, sine, density });
-        self.refit_near_the_last(sine.subtracted_from(series))
+    /// Takes a sinusoid out of the `series`; returns the rest.
+    pub(super) fn take(&mut self, found: FoundSine, series: &UniformSeries) -> UniformSeries {
+        self.found.push(found);
+        self.refit_near_the_last(found.sine.subtracted_from(series))
     }
 
     /// Takes the two sidebands of a sinusoid out of the `series` if its modulation is likelier than the `resonance`.
@@ -49,19 +48,18 @@ impl FoundSines {
             is_on_skirts(found.sine.frequency, resonance)
                 && found.resolutions_from(resonance.frequency.value, duration) <= MOST_PERIODS as f64
         };
-        let strongest =
-            self.found.iter().filter(is_in_band).max_by(|a, b| a.line.statistic.total_cmp(&b.line.statistic))?.clone();
+        let over_noise = |found: &FoundSine| found.over_noise(series);
+        let in_band = self.found.iter().filter(is_in_band);
+        let strongest = *in_band.max_by(|a, b| over_noise(a).total_cmp(&over_noise(b)))?;
         let change = Modulation::find(&strongest.sine, series, strongest.density, |_| true)?;
         if change.with_multiples < resonance.statistic {
             return None;
         }
-        let mut left = series.clone();
-        for distance in [-change.frequency.value, change.frequency.value] {
+        let without_sideband = |left: UniformSeries, distance: f64| {
             let sine = Sine::fit_near(&left, strongest.sine.frequency + distance, 0.5 / duration);
-            let line = sine_line(&sine, duration, sine.density(&left) / strongest.density, resonance.p_value);
-            left = self.take_over(strongest.density, line, sine, &left);
-        }
-        Some(left)
+            self.take(FoundSine { sine, p_value: resonance.p_value, ..strongest }, &left)
+        };
+        Some([-change.frequency.value, change.frequency.value].into_iter().fold(series.clone(), without_sideband))
     }
 
     /// Refits the last sinusoid and its neighbours, each to the record without the others; returns the rest.
@@ -81,47 +79,61 @@ impl FoundSines {
             for found in &mut near {
                 let with_it = found.sine.negative().subtracted_from(&rest);
                 found.sine = Sine::fit_near(&with_it, found.sine.frequency, 0.5 / duration);
-                let ratio = found.sine.density(&with_it) / found.density;
-                found.line = sine_line(&found.sine, duration, ratio, found.line.p_value);
                 rest = found.sine.subtracted_from(&with_it);
             }
         }
         rest
     }
 
-    /// The lines with their changes, without sidebands of others; `rest` is the record without the lines.
+    /// The lines with their changes, if these are likelier than the `resonances` around them, and without sidebands of others; `rest` is the
+    /// record without the lines.
     pub(super) fn into_lines(self, rest: &UniformSeries, resonances: &[Resonance]) -> Vec<SpectralLine> {
         let Self { mut found } = self;
         let duration = rest.duration();
-        let mut at = 0;
-        while let Some(line) = found.get(at) {
-            let frequency = line.sine.frequency;
-            let is_near = |other: &&FoundSine| other.is_near(frequency, duration) && other.is_weaker_than(line);
-            let near: Vec<&FoundSine> = found.iter().filter(is_near).collect();
+        let mut lines = Vec::new();
+        found.sort_by(|a, b| a.sine.amplitude().total_cmp(&b.sine.amplitude()));
+        while let Some(strongest) = found.pop() {
+            let frequency = strongest.sine.frequency;
+            let distance = |other: &FoundSine| other.sine.frequency - frequency;
+            let near: Vec<&FoundSine> = found.iter().filter(|other| other.is_near(frequency, duration)).collect();
             let with_near = near.iter().fold(rest.clone(), |rest, other| other.sine.negative().subtracted_from(&rest));
-            let distance = |other: &FoundSine| (other.sine.frequency - frequency).abs();
-            let has_line = |of: f64| near.iter().any(|other| is_same(distance(other), of, duration));
-            let is_examined = !resonances.iter().any(|resonance| is_on_skirts(frequency, &resonance.line));
-            let find = || Modulation::find(&line.sine, &with_near, line.density, has_line);
-            let change = if is_examined { find() } else { None };
-            found[at].line.modulation = change;
-            if let Some(change) = change {
-                let deviation = found[at].line.deviation.value;
-                let is_sideband = |other: &FoundSine| {
-                    let distance = other.sine.frequency - frequency;
-                    other.line.deviation.value < deviation && change.is_sideband(distance, duration)
-                };
-                let before = found[..at].iter().filter(|other| is_sideband(other)).count();
-                found.retain(|other| !is_sideband(other));
-                at -= before;
-            }
-            at += 1;
+            let has_line = |of: f64| near.iter().any(|other| is_same(distance(other).abs(), of, duration));
+            let is_likelier = |change: &Modulation| {
+                let mut bands = resonances.iter().filter(|resonance| is_on_skirts(frequency, &resonance.line));
+                bands.all(|resonance| change.with_multiples >= resonance.line.statistic)
+            };
+            let modulation =
+                Modulation::find(&strongest.sine, &with_near, strongest.density, has_line).filter(is_likelier);
+            found.retain(|other| !modulation.is_some_and(|change| change.is_sideband(distance(other), duration)));
+            lines.push(SpectralLine { modulation, ..strongest.line(rest) });
         }
-        found.into_iter().map(|found| found.line).collect()
+        lines
     }
 }
 
 impl FoundSine {
+    /// Its ordinate over the noise.
+    pub(super) fn over_noise(&self, series: &UniformSeries) -> f64 {
+        self.sine.density(series) / self.density
+    }
+
+    /// As a line of the spectrum of `series`.
+    pub(super) fn line(&self, series: &UniformSeries) -> SpectralLine {
+        let (amplitude, ratio) = (self.sine.amplitude(), self.over_noise(series));
+        SpectralLine {
+            frequency: MeasuredValue {
+                value: self.sine.frequency,
+                error: 1.5f64.sqrt() / (PI * series.duration() * ratio.sqrt()),
+            },
+            deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
+            width: None,
+            statistic: 2.0 * ratio,
+            p_value: self.p_value,
+            shape_p_value: 1.0,
+            modulation: None,
+        }
+    }
+
     /// True if a line at `frequency`, Hz, is distinct but near enough for a sideband.
     fn is_near(&self, frequency: f64, duration: f64) -> bool {
         (1.0..=MOST_PERIODS as f64 + 1.0).contains(&self.resolutions_from(frequency, duration))
@@ -129,10 +141,6 @@ impl FoundSine {
 
     fn resolutions_from(&self, frequency: f64, duration: f64) -> f64 {
         (self.sine.frequency - frequency).abs() * duration
-    }
-
-    fn is_weaker_than(&self, other: &Self) -> bool {
-        self.line.deviation.value < other.line.deviation.value
     }
 }
 

@@ -1,11 +1,12 @@
-//! Higher harmonics of a periodic signal than those by which it was found.
+//! Multiples of a frequency, and higher harmonics of a periodic signal than those by which it was found.
 //!
 //! Each may be weaker than the noise, so they are sought octave by octave by their mean over that half-way between. The
 //! frequency is that of the largest total power.
 
 use super::line_models::PhaseSums;
-use crate::bounds::BoundedEstimate;
-use crate::distributions::{NORMAL_975, mean_ratio_tail};
+use crate::bounds::{BoundedEstimate, MeasuredValue};
+use crate::distributions::mean_ratio_tail;
+use crate::minimum::summit;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
@@ -19,6 +20,12 @@ const STEPS: f64 = 8.0;
 
 /// Variance of a frequency by the taper: Σt²·Σw²t²/(Σwt²)² from the middle.
 const TAPERED: f64 = 1.12;
+
+/// The multiple of a fundamental, from the first to the `highest`, that is nearest to a frequency, and its distance.
+pub(crate) fn nearest_multiple(frequency: f64, fundamental: f64, highest: f64) -> (f64, f64) {
+    let multiple = (frequency / fundamental).round().clamp(1.0, highest);
+    (multiple, (frequency - multiple * fundamental).abs())
+}
 
 pub(super) struct Harmonics {
     fundamental: f64,
@@ -80,10 +87,7 @@ impl Harmonics {
         };
         let powers = (-(STEPS as i32)..=STEPS as i32).map(|steps| (f64::from(steps), power(f64::from(steps))));
         let (best, largest) = powers.fold((0.0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
-        let [left, right] = [power(best - 1.0), power(best + 1.0)];
-        let curvature = 2.0 * largest - left - right;
-        let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-1.0, 1.0) } else { 0.0 };
-        self.fundamental + (best + shift) * step
+        self.fundamental + (best + summit([power(best - 1.0), largest, power(best + 1.0)])) * step
     }
 
     /// Frequency of the fundamental, Hz (Cramér-Rao bound); `None` if the harmonics do not exceed the noise.
@@ -95,8 +99,8 @@ impl Harmonics {
             whole += square * over_noise;
             excess += square * (over_noise - 1.0);
         }
-        let error = NORMAL_975 * (1.5 * TAPERED * whole).sqrt() / excess * self.resolution / PI;
-        (excess > 0.0).then_some(BoundedEstimate::new(of, of - error, of + error))
+        let error = (1.5 * TAPERED * whole).sqrt() / excess * self.resolution / PI;
+        (excess > 0.0).then(|| MeasuredValue { value: of, error }.bounds())
     }
 
     /// Amplitudes from the first one on, in the unit of the series: 0 below the noise.

@@ -4,11 +4,14 @@
 //! In noise their ordinates are exponential; a change is the coherent sum of two sidebands. Wandering falls as 1/f² to
 //! the noise (D. B. Leeson, Proc. IEEE 54, 1966).
 
+use super::harmonics::nearest_multiple;
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
+use super::whitened_spectrum::SpectralLine;
 use super::whittle::{Sign, SpectralBand, fit_mixture};
 use crate::bounds::MeasuredValue;
 use crate::distributions::NORMAL_975;
+use crate::minimum::summit;
 use crate::samples::uniform_series::UniformSeries;
 use fourier::Complex;
 use std::f64::consts::{PI, TAU};
@@ -38,13 +41,18 @@ const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
 /// Resolutions within which two frequencies are one.
 const SAME: f64 = 1.5;
 
+/// Distance of sidebands beyond the taper's side lobes, and largest difference of their distances, resolutions of a spectrum without phases.
+const LOBE_RESOLUTIONS: f64 = 2.5;
+const LEAST_SYMMETRIC: f64 = 0.5;
+/// Largest relative difference of equal sidebands, and in standard deviations.
+const SIDEBAND_RATIO: f64 = 0.25;
+const SIDEBAND_SIGMAS: f64 = 3.0;
+
 /// A periodic change of a line's amplitude or phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Modulation {
     /// Hz.
     pub frequency: MeasuredValue,
-    /// Deviation of the line alone over that of all lines merged with it.
-    pub of_line: f64,
     /// Relative amplitude of the change, or of the phase in rad.
     pub depth: MeasuredValue,
     /// True if the phase changes, not the amplitude.
@@ -59,9 +67,35 @@ impl Modulation {
     /// True if a line at a distance, Hz, from the modulated one is a sideband, at a multiple of the change.
     pub(super) fn is_sideband(&self, distance: f64, duration: f64) -> bool {
         let highest = highest_multiple(0.5 * self.statistic);
-        let multiple = (distance.abs() / self.frequency.value).round().clamp(1.0, highest);
-        let error = (multiple - 1.0) * self.frequency.error;
-        (distance.abs() - multiple * self.frequency.value).abs() < (SAME / duration).hypot(NORMAL_975 * error)
+        let (multiple, distance) = nearest_multiple(distance.abs(), self.frequency.value, highest);
+        distance < (SAME / duration).hypot(NORMAL_975 * (multiple - 1.0) * self.frequency.error)
+    }
+
+    /// The change of a sinusoid with two others equally far from it and equally strong, in a spectrum of this `resolution`, Hz, which has
+    /// no phases.
+    pub(super) fn by_sidebands(line: &SpectralLine, sides: [&SpectralLine; 2], resolution: f64) -> Option<Self> {
+        let [one, other] = sides;
+        let distances = sides.map(|side| (side.frequency.value - line.frequency.value) / resolution);
+        let is_beside = distances.iter().all(|distance| distance.abs() > LOBE_RESOLUTIONS);
+        let is_symmetric = distances.iter().sum::<f64>().abs() < LEAST_SYMMETRIC;
+        let mean = 0.5 * (one.deviation.value + other.deviation.value);
+        let error = one.deviation.error.hypot(other.deviation.error);
+        let difference = (one.deviation.value - other.deviation.value).abs();
+        let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
+        let are_sinusoids = [line, one, other].iter().all(|of| of.width.is_none());
+        // A sideband has half the depth.
+        let over_line = 2.0 / line.deviation.value;
+        let statistic = one.statistic + other.statistic;
+        (is_beside && is_symmetric && is_equal && are_sinusoids).then(|| Self {
+            frequency: MeasuredValue {
+                value: 0.5 * (one.frequency.value - other.frequency.value).abs(),
+                error: 0.5 * one.frequency.error.hypot(other.frequency.error),
+            },
+            depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
+            of_phase: false,
+            statistic,
+            with_multiples: statistic,
+        })
     }
 
     /// The clearest change of `sine` in `rest`; `None` if noise of `density`, unit²/Hz, or another line explains it.
@@ -106,7 +140,6 @@ impl Modulation {
         let relative = 1.0 / (2.0 * ratio).sqrt();
         Some(Self {
             frequency: MeasuredValue { value: frequency, error: 3f64.sqrt() / (PI * rest.duration()) * relative },
-            of_line: 1.0,
             depth: MeasuredValue { value: depth, error: depth * relative },
             of_phase: matches!(part, Part::Quadrature),
             statistic: 2.0 * ratio,
@@ -184,11 +217,9 @@ impl Envelope {
 
     /// The maximum near `periods` a record.
     fn vertex(&self, part: Part, periods: f64) -> f64 {
-        AROUND.into_iter().fold(periods, |at, step| {
-            let [left, middle, right] = [at - step, at, at + step].map(|at| self.power(part, at));
-            let curvature = 2.0 * middle - left - right;
-            if curvature > 0.0 { at + (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { at }
-        })
+        AROUND
+            .into_iter()
+            .fold(periods, |at, step| at + step * summit([at - step, at, at + step].map(|at| self.power(part, at))))
     }
 
     fn without(&self, part: Part, periods: f64) -> Self {
@@ -218,10 +249,7 @@ fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, un
     let rest = envelope.without(part, periods);
     let power = envelope.power(part, periods) / unit;
     let highest = highest_multiple(power);
-    let is_multiple = |at: f64| {
-        let multiple = (at / periods).round().clamp(1.0, highest);
-        (at - multiple * periods).abs() < OF_MULTIPLE
-    };
+    let is_multiple = |at: f64| nearest_multiple(at, periods, highest).1 < OF_MULTIPLE;
     let band =
         |periods: f64| SpectralBand { frequency: periods, density: rest.power(part, periods) / unit, ordinates: 1.0 };
     let beside: Vec<SpectralBand> = (1..=most).map(|at| at as f64).filter(|at| !is_multiple(*at)).map(band).collect();
@@ -344,8 +372,7 @@ mod tests {
     fn lines_at_multiples_of_a_change_are_its_sidebands() {
         let change = |turns: f64| MeasuredValue { value: turns / 400.0, error: 0.01 / 400.0 };
         let (frequency, depth) = (change(8.0), change(1.0));
-        let found =
-            Modulation { frequency, of_line: 1.0, depth, of_phase: false, statistic: 100.0, with_multiples: 100.0 };
+        let found = Modulation { frequency, depth, of_phase: false, statistic: 100.0, with_multiples: 100.0 };
         let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
         assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
         // The fifth has one part in 25 of 25 times the noise.

@@ -2,6 +2,7 @@
 
 use super::periodogram::taper;
 use super::whittle::departure_by_chance;
+use crate::minimum::summit;
 use crate::samples::uniform_series::UniformSeries;
 use fourier::Complex;
 use nalgebra::{Matrix4, Vector4};
@@ -29,12 +30,10 @@ impl Sine {
         // Parabolas of decreasing width.
         for step in [0.3 * spacing, 0.1 * spacing, 0.03 * spacing] {
             let [left, right] = [-step, step].map(|offset| sums.power_at(frequency + offset));
-            let curvature = 2.0 * power - left - right;
-            let shift =
-                if curvature > 0.0 { (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { 0.0 };
-            let summit = sums.power_at(frequency + shift);
-            if summit > power {
-                (frequency, power) = (frequency + shift, summit);
+            let shifted = frequency + step * summit([left, power, right]);
+            let highest = sums.power_at(shifted);
+            if highest > power {
+                (frequency, power) = (shifted, highest);
             }
         }
         sums.fit_at(frequency)
@@ -162,21 +161,10 @@ impl PhaseSums {
 }
 
 /// Calls `visit` with position, value, cosine and sine of every sample.
-pub(super) fn for_each_phase(series: &UniformSeries, frequency: f64, visit: impl FnMut(usize, f64, f64, f64)) {
-    for_each_turn(series.values(), frequency * series.sample_period(), visit);
-}
-
-/// `Σye^(−iωt)` of some values with a phase of `turn` turns from one to the next.
-pub(super) fn transform_at(values: &[f64], turn: f64) -> Complex<f64> {
-    let mut sum = Complex::ZERO;
-    for_each_turn(values, turn, |_, value, cosine, sine| sum += value * Complex::new(cosine, -sine));
-    sum
-}
-
-/// [`for_each_phase`] with `turn` turns per value.
-fn for_each_turn(values: &[f64], turn: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
+pub(super) fn for_each_phase(series: &UniformSeries, frequency: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
+    let turn = frequency * series.sample_period();
     let (step_sine, step_cosine) = (TAU * turn).sin_cos();
-    for (block, values) in values.chunks(STEPS).enumerate() {
+    for (block, values) in series.values().chunks(STEPS).enumerate() {
         // Whole turns are dropped before the multiplication, which would cost digits.
         let (mut sine, mut cosine) = (TAU * (turn * (block * STEPS) as f64).fract()).sin_cos();
         for (at, value) in values.iter().enumerate() {

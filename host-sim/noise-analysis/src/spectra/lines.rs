@@ -5,15 +5,14 @@
 //! the sample rate has a [test of its own](super::alternation).
 
 use super::alternation::Alternation;
-use super::found_sines::{FoundSines, is_on_skirts};
+use super::found_sines::{FoundSine, FoundSines, is_on_skirts};
 use super::line_models::Sine;
 use super::periodogram::{PADDING, Periodogram};
-use super::whitened_spectrum::{
-    Candidate, FEWEST_PERIODS, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit, sine_line,
-};
+use super::spectral_lines::gain_of_mean;
+use super::whitened_spectrum::{Candidate, FEWEST_PERIODS, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
-use std::f64::consts::{LN_2, PI};
+use std::f64::consts::LN_2;
 
 pub(super) const MOST: usize = 6;
 /// Most resonances refitted when one is added: each fits the background again.
@@ -59,7 +58,7 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
         && let Some(spectrum) = WhitenedSpectrum::new(&transformed.spectrum, known, &resonances, None)
     {
         match spectrum.most_significant(&transformed.series) {
-            Some(Candidate::Sine(line, sine)) => rest = Transformed::new(sines.take(line, sine, &transformed.series)),
+            Some(Candidate::Sine(found)) => rest = Transformed::new(sines.take(found, &transformed.series)),
             Some(Candidate::Resonance(resonance)) => match sines.take_sidebands(&resonance.line, &transformed.series) {
                 Some(left) => rest = Transformed::new(left),
                 None => {
@@ -81,7 +80,9 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
     let mut found: Vec<SpectralLine> = slow.into_iter().chain(sines).chain(others).collect();
     found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let all = found.clone();
-    found.retain(|line| !all.iter().any(|strong| is_residue(line, strong)));
+    found.retain(|line| {
+        !all.iter().any(|strong| is_residue(line, strong) || strong.has_sideband(line, series.duration()))
+    });
     found
 }
 
@@ -112,8 +113,7 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     for _ in 0..MOST {
         let Some(sine) = sine_that_stands_out(&means) else { break };
         means = sine.subtracted_from(&means);
-        let (half_turn, count) = (PI * sine.frequency * width, size as f64);
-        let gain = half_turn.sin() / (count * (half_turn / count).sin());
+        let gain = gain_of_mean(sine.frequency, width, size as u64);
         series = sine.scaled(1.0 / gain).delayed(delay).subtracted_from(&series);
     }
     series
@@ -162,7 +162,7 @@ fn exceeds_others(ordinates: &[f64], at: usize, limit: f64) -> bool {
 fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
     let mut found = Vec::new();
     while found.len() < MOST_SLOW {
-        let Some(SlowSine { level, slow, spacing, mut sine }) = SlowSine::first_fit(&series) else { break };
+        let Some(SlowSine { slow, spacing, mut sine }) = SlowSine::first_fit(&series) else { break };
         for _ in 0..SLOW_ROUNDS {
             let without = sine.subtracted_from(&series);
             let lines =
@@ -172,10 +172,10 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
         }
         let Some(part) = part_left(&series, &sine, slow).filter(|part| part * SLOW_GAIN <= 1.0) else { break };
         let left = part * slow / FEWEST_PERIODS as f64;
-        let ratio = sine.density(&level) / left.max(series.rounding().density(sine.frequency));
+        let density = left.max(series.rounding().density(sine.frequency));
         // Two degrees of freedom per ordinate, less sinusoid and line.
         let p_value = part.powi(FEWEST_PERIODS as i32 - 2);
-        found.push((sine, sine_line(&sine, series.duration(), ratio, p_value)));
+        found.push((sine, FoundSine { sine, density, p_value }.line(&series)));
         series = sine.subtracted_from(&series);
     }
     found
@@ -183,7 +183,6 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
 
 /// A candidate for nearly all of the slow variation.
 struct SlowSine {
-    level: UniformSeries,
     slow: f64,
     /// For padded ordinates, Hz.
     spacing: f64,
@@ -201,7 +200,7 @@ impl SlowSine {
         let sine = Sine::fit_near(&level, at as f64 * spacing, spacing);
         let slow = slow_variation(&spectrum);
         let part = part_left(series, &sine, slow).filter(|part| *part <= SLOW_LEFT);
-        part.map(|_| Self { level, slow, spacing, sine })
+        part.map(|_| Self { slow, spacing, sine })
     }
 }
 

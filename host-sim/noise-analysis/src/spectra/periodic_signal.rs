@@ -4,15 +4,15 @@
 //! searches: J. Taylor and G. Huguenin, Nature 221, 1969). The noise, white, walking and Markov, is fitted between the
 //! harmonics.
 
-use super::harmonics::Harmonics;
-use super::line_models::{Sine, transform_at};
-use super::periodogram::taper;
+use super::harmonics::{Harmonics, nearest_multiple};
+use super::line_models::{PhaseSums, Sine};
+use super::periodogram::Periodogram;
 use super::slow_background::SlowBackground;
-use super::whittle::SpectralBand;
-use crate::bounds::BoundedEstimate;
+use crate::bounds::{BoundedEstimate, MeasuredValue};
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
+use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Harmonics in the sum, including the fundamental.
@@ -29,8 +29,6 @@ const LOBE: f64 = 1.2;
 const EXAMINED: usize = 8;
 /// Largest p-value of an examined sum, by the noise of all ordinates, the harmonics included.
 const PROMISING: f64 = 0.1;
-/// White noise, a random walk and ten Markov processes.
-const TERMS: usize = 12;
 /// Largest p-value of the even harmonics (none in a square wave) and of the odd ones (none at half the frequency).
 const EVEN_BY_CHANCE: f64 = 1e-3;
 const ODD_BY_CHANCE: f64 = 0.05;
@@ -70,14 +68,16 @@ impl PeriodicSignal {
         let size = (series.values().len() / (4 * HARMONICS * periods.end)).max(1);
         let blocks = series.averaged(size).detrended();
         let most = periods.end.min(blocks.values().len() / (4 * HARMONICS));
-        let spectrum = PaddedSpectrum::new(&blocks).filter(|_| most > periods.start)?;
+        let spectrum = Periodogram::padded_by(PADDING, &blocks).filter(|_| most > periods.start)?;
         let highest = 2 * HARMONICS * most;
-        let noise = spectrum.noise(None, highest)?;
+        let noise = SlowBackground::fit(orders(&spectrum, None, highest))?;
         let sum = |step: usize| {
             let fundamental = step as f64 / STEPS as f64;
-            let ratios: Vec<f64> = (1..=HARMONICS).map(|number| spectrum.ratio(&noise, number, fundamental)).collect();
-            let sum: f64 = ratios.iter().sum();
-            (sum - ratios.iter().copied().fold(0.0, f64::max), sum, fundamental)
+            let orders = (1..=HARMONICS).map(|number| number as f64 * fundamental);
+            let (sum, largest) = orders
+                .map(|order| spectrum.at(order) / noise.density(order))
+                .fold((0.0, 0.0_f64), |(sum, largest), ratio| (sum + ratio, largest.max(ratio)));
+            (sum - largest, sum, fundamental)
         };
         let mut sums: Vec<(f64, f64, f64)> = (STEPS * periods.start..STEPS * most).map(sum).collect();
         sums.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -94,70 +94,58 @@ impl PeriodicSignal {
     /// Examines a fundamental, in resolutions, over the noise up to `highest`, on the record without the fundamental.
     fn examine(
         blocks: &UniformSeries,
-        spectrum: &PaddedSpectrum,
+        spectrum: &Periodogram,
         (fundamental, highest): (f64, usize),
         trials: f64,
     ) -> Option<Self> {
-        let resolution = 1.0 / blocks.duration();
+        let resolution = spectrum.resolution();
         let sine = Sine::fit_near(blocks, fundamental * resolution, resolution / PADDING as f64);
-        let rest = PaddedSpectrum::at_harmonics(&sine.subtracted_from(blocks).detrended(), fundamental)?;
-        let noise = rest.noise(Some(fundamental), highest)?;
-        let (between, level) = rest.between(&noise, fundamental);
-        let noise_at = |number: usize| level * noise.density(number as f64 * fundamental);
-        let over_noise =
-            |of: &PaddedSpectrum, number: usize| of.density(number as f64 * fundamental) / noise_at(number);
-        let ratios: Vec<f64> = (2..=HARMONICS).map(|number| over_noise(&rest, number)).collect();
-        let sum: f64 = ratios.iter().sum();
-        let by_chance = |first: usize| {
-            let (count, sum) =
-                ratios.iter().skip(first).step_by(2).fold((0.0, 0.0), |(n, sum), of| (n + 1.0, sum + of));
-            exponential_sum_tail(count, sum)
+        let without = sine.subtracted_from(blocks).detrended();
+        let rest = Periodogram::padded_by(1, &without)?;
+        let noise = SlowBackground::fit(orders(&rest, Some(fundamental), highest))?;
+        let (between, level) = between(&rest, &noise, fundamental);
+        let ordinate = |number: usize, density: f64| Ordinate {
+            density,
+            noise: level * noise.density(number as f64 * fundamental),
+        };
+        let higher = |number: usize| {
+            let frequency = number as f64 * fundamental * resolution;
+            ordinate(number, PhaseSums::new(&without, frequency).fit_at(frequency).density(&without))
+        };
+        let first = ordinate(1, spectrum.at(fundamental));
+        let higher: Vec<Ordinate> = (2..=HARMONICS).map(higher).collect();
+        let sum: f64 = higher.iter().map(Ordinate::over_noise).sum();
+        let by_chance = |skipped: usize| {
+            let of = || higher.iter().skip(skipped).step_by(2);
+            exponential_sum_tail(of().count() as f64, of().map(Ordinate::over_noise).sum())
         };
         // The first of them is the second harmonic.
         let has_both = by_chance(0) < EVEN_BY_CHANCE && by_chance(1) < ODD_BY_CHANCE;
-        let largest = ratios.iter().copied().fold(0.0, f64::max) / sum;
-        let excess = |of: &PaddedSpectrum, number: usize| (over_noise(of, number) - 1.0) * noise_at(number);
-        let first = excess(spectrum, 1);
-        let powers: Vec<f64> = (2..=HARMONICS).map(|number| excess(&rest, number)).collect();
-        // Power P over noise n has the variance n² + 2nP.
-        let variance = |power: f64, number: usize| {
-            let density = noise_at(number);
-            density * (density + 2.0 * power.max(0.0))
-        };
-        let is_no_larger = |(number, power): (usize, &f64)| {
-            *power - first < NORMAL_975 * (variance(first, 1) + variance(*power, number)).sqrt()
-        };
-        let is_fundamental = first > (LEAST_FUNDAMENTAL - 1.0) * noise_at(1) && (2..).zip(&powers).all(is_no_larger);
+        let largest = higher.iter().map(Ordinate::over_noise).fold(0.0, f64::max) / sum;
+        let is_no_larger =
+            |of: &Ordinate| of.excess() - first.excess() < NORMAL_975 * (first.variance() + of.variance()).sqrt();
+        let is_fundamental = first.over_noise() > LEAST_FUNDAMENTAL && higher.iter().all(is_no_larger);
         if !is_fundamental || !has_both || largest > LARGEST_SHARE {
             return None;
         }
         // Exponential sums; those between the harmonics gave the level.
-        let (above, below) = (ratios.len() as f64, between as f64);
+        let (above, below) = (higher.len() as f64, between as f64);
         let by_harmonics = mean_ratio_tail(sum / above, above, below);
-        let whole = sum + over_noise(spectrum, 1);
-        let with_fundamental = mean_ratio_tail(whole / (above + 1.0), above + 1.0, below);
+        let with_fundamental = mean_ratio_tail((sum + first.over_noise()) / (above + 1.0), above + 1.0, below);
         let is_periodic = HARMONICS as f64 * by_harmonics < HARMONICS_BY_CHANCE;
         let by_chance = if is_periodic { by_harmonics.min(with_fundamental) } else { by_harmonics };
-        let p_value = (2.0 * trials * by_chance).min(1.0);
-        let percent = 100.0 * (powers.iter().sum::<f64>().max(0.0) / first).sqrt();
-        let relative = NORMAL_975 / (2.0 * sum).sqrt();
-        let of_noise = first / noise_at(1);
-        // Cramér-Rao bound of the fundamental alone.
-        let error = NORMAL_975 * 1.5f64.sqrt() * resolution / (std::f64::consts::PI * of_noise.sqrt());
-        let amplitude = sine.amplitude();
-        // Relative variance 1/(2·power) of the amplitude.
-        let half = NORMAL_975 / (2.0 * of_noise).sqrt();
+        let percent = 100.0 * (higher.iter().map(Ordinate::excess).sum::<f64>().max(0.0) / first.excess()).sqrt();
+        let (amplitude, power) = (sine.amplitude(), first.over_noise() - 1.0);
+        let bounds = |value: f64, error: f64| MeasuredValue { value, error }.bounds();
         Some(Self {
-            amplitude: BoundedEstimate::new(amplitude, amplitude * (1.0 - half).max(0.0), amplitude * (1.0 + half)),
-            harmonics: powers.iter().map(|power| amplitude * (power.max(0.0) / first).sqrt()).collect(),
-            frequency: BoundedEstimate::new(sine.frequency, sine.frequency - error, sine.frequency + error),
-            harmonics_percent: BoundedEstimate::new(
-                percent,
-                percent * (1.0 - relative).max(0.0),
-                percent * (1.0 + relative),
-            ),
+            // Cramér-Rao bound of the fundamental alone.
+            frequency: bounds(sine.frequency, 1.5f64.sqrt() * resolution / (PI * power.sqrt())),
+            // Relative variance 1/(2·power) of an amplitude.
+            amplitude: bounds(amplitude, amplitude / (2.0 * power).sqrt()),
+            harmonics: higher.iter().map(|of| amplitude * (of.excess().max(0.0) / first.excess()).sqrt()).collect(),
+            harmonics_percent: bounds(percent, percent / (2.0 * sum).sqrt()),
             sum,
-            p_value,
+            p_value: (2.0 * trials * by_chance).min(1.0),
         })
     }
 
@@ -187,8 +175,7 @@ impl PeriodicSignal {
 
     /// True if a frequency, Hz, is within `within` Hz of a multiple.
     pub(crate) fn has(&self, frequency: f64, within: f64) -> bool {
-        let multiple = (frequency / self.frequency.value).round().max(1.0);
-        (frequency - multiple * self.frequency.value).abs() < within
+        nearest_multiple(frequency, self.frequency.value, f64::INFINITY).1 < within
     }
 
     /// True if a frequency, Hz, is between half an octave below the fundamental and the highest harmonic.
@@ -201,118 +188,41 @@ impl PeriodicSignal {
     }
 }
 
-/// A periodogram with [`PADDING`] ordinates per resolution, all or only those for one fundamental.
-struct PaddedSpectrum {
-    /// Ordinates, `spacing` padded ones apart, from 0 on.
-    power: Vec<f64>,
-    spacing: usize,
-    between: Vec<(usize, f64)>,
+/// The ordinate of a harmonic, and the noise there.
+struct Ordinate {
+    density: f64,
+    noise: f64,
 }
 
-/// Padded ordinate nearest to an order in periods per record.
-fn position(order: f64) -> usize {
-    (order * PADDING as f64).round() as usize
+impl Ordinate {
+    fn over_noise(&self) -> f64 {
+        self.density / self.noise
+    }
+
+    fn excess(&self) -> f64 {
+        self.density - self.noise
+    }
+
+    /// Of a power P over noise n, n² + 2nP.
+    fn variance(&self) -> f64 {
+        self.noise * (self.noise + 2.0 * self.excess().max(0.0))
+    }
 }
 
-/// Samples under the taper, 0 if missing, and the sum of their squared weights; `None` without any.
-fn tapered(blocks: &UniformSeries) -> Option<(Vec<f64>, f64)> {
-    let (length, mut squares) = (blocks.values().len(), 0.0);
-    let weighted = |(at, value): (usize, &f64)| {
-        if !value.is_finite() {
-            return 0.0;
-        }
-        let weight = taper(at, length);
-        squares += weight * weight;
-        weight * value
-    };
-    let values = blocks.values().iter().enumerate().map(weighted).collect();
-    (squares > 0.0).then_some((values, squares))
+/// Independent ordinates from order 1 to below `highest` that harmonics of `fundamental` do not reach.
+fn orders(spectrum: &Periodogram, fundamental: Option<f64>, highest: usize) -> impl Iterator<Item = (usize, f64)> {
+    let is_between = move |order: f64| fundamental.is_none_or(|of| (order - (order / of).round() * of).abs() > LOBE);
+    let ordinates = spectrum.independent().enumerate().take(highest).skip(1);
+    ordinates.filter(move |(order, _)| is_between(*order as f64))
 }
 
-/// `|Σwye^(−iωt)|²/Σw²` of wy, padded to `length`.
-fn power(values: &[f64], length: usize, squares: f64) -> Option<Vec<f64>> {
-    let transform = fourier::forward(length);
-    let mut input = transform.make_input_vec();
-    input.iter_mut().zip(values).for_each(|(slot, value)| *slot = *value);
-    let mut output = transform.make_output_vec();
-    transform.process(&mut input, &mut output).ok()?;
-    Some(output.iter().map(|bin| bin.norm_sqr() / squares).collect())
-}
-
-impl PaddedSpectrum {
-    fn new(blocks: &UniformSeries) -> Option<Self> {
-        let (values, squares) = tapered(blocks)?;
-        let power = power(&values, PADDING * values.len(), squares)?;
-        Some(Self { power, spacing: 1, between: Vec::new() })
-    }
-
-    /// The independent ordinates, and those of a fundamental's harmonics.
-    fn at_harmonics(blocks: &UniformSeries, fundamental: f64) -> Option<Self> {
-        let (values, squares) = tapered(blocks)?;
-        let length = PADDING * values.len();
-        let of_harmonic = |number: usize| {
-            let at = position(number as f64 * fundamental);
-            (at <= length / 2).then(|| (at, transform_at(&values, at as f64 / length as f64).norm_sqr() / squares))
-        };
-        let between = (1..=HARMONICS).filter_map(of_harmonic).collect();
-        Some(Self { power: power(&values, values.len(), squares)?, spacing: PADDING, between })
-    }
-
-    fn density(&self, order: f64) -> f64 {
-        let at = position(order);
-        match self.between.iter().find(|(of, _)| *of == at) {
-            Some((_, density)) => *density,
-            None => self.power.get(at / self.spacing).copied().unwrap_or(0.0),
-        }
-    }
-
-    fn ratio(&self, noise: &SlowBackground<TERMS>, number: usize, fundamental: f64) -> f64 {
-        let order = number as f64 * fundamental;
-        self.density(order) / noise.density(order)
-    }
-
-    /// Independent orders below `highest` that harmonics of `fundamental` do not reach.
-    fn orders(&self, fundamental: Option<f64>, highest: usize) -> impl Iterator<Item = usize> {
-        let last = highest.min((self.power.len() - 1) * self.spacing / PADDING);
-        (1..last).filter(move |&order| {
-            fundamental.is_none_or(|fundamental| {
-                let order = order as f64;
-                (order - (order / fundamental).round() * fundamental).abs() > LOBE
-            })
-        })
-    }
-
-    /// The noise by those ordinates, or by all.
-    fn noise(&self, fundamental: Option<f64>, highest: usize) -> Option<SlowBackground<TERMS>> {
-        let mut bands: Vec<(usize, f64, f64, f64)> = Vec::new();
-        for order in self.orders(fundamental, highest) {
-            let density = self.density(order as f64);
-            match bands.last_mut() {
-                Some((first, orders, sum, count)) if order < *first + *first / 8 + 1 => {
-                    (*orders, *sum, *count) = (*orders + order as f64, *sum + density, *count + 1.0);
-                }
-                _ => bands.push((order, order as f64, density, 1.0)),
-            }
-        }
-        let bands: Vec<SpectralBand> = bands
-            .into_iter()
-            .map(|(_, orders, sum, count)| SpectralBand {
-                frequency: orders / count,
-                density: sum / count,
-                ordinates: count,
-            })
-            .collect();
-        if bands.len() < TERMS { None } else { SlowBackground::fit(&bands) }
-    }
-
-    /// Number of ordinates between the harmonics of `fundamental`, and their mean over the noise, at least 1.
-    fn between(&self, noise: &SlowBackground<TERMS>, fundamental: f64) -> (usize, f64) {
-        let highest = |harmonics: f64| (harmonics * fundamental).ceil() as usize;
-        let near = self.orders(Some(fundamental), highest(HARMONICS as f64 + 0.5)).map(|order| order as f64);
-        let (count, sum) = near
-            .fold((0.0, 0.0), |(count, sum), order| (count + 1.0, sum + self.density(order) / noise.density(order)));
-        (self.orders(Some(fundamental), highest(2.0 * HARMONICS as f64)).count(), (sum / count).max(1.0))
-    }
+/// Number of ordinates between the harmonics of `fundamental`, and their mean over the noise, at least 1.
+fn between(spectrum: &Periodogram, noise: &SlowBackground, fundamental: f64) -> (usize, f64) {
+    let highest = |harmonics: f64| (harmonics * fundamental).ceil() as usize;
+    let near = orders(spectrum, Some(fundamental), highest(HARMONICS as f64 + 0.5));
+    let (count, sum) = near
+        .fold((0.0, 0.0), |(count, sum), (order, density)| (count + 1.0, sum + density / noise.density(order as f64)));
+    (orders(spectrum, Some(fundamental), highest(2.0 * HARMONICS as f64)).count(), (sum / count).max(1.0))
 }
 
 #[cfg(test)]
@@ -334,21 +244,6 @@ mod tests {
             walk + random.sample::<f64, _>(StandardNormal) + signal(at as f64 / SAMPLES as f64)
         };
         UniformSeries::new(0.1, (0..SAMPLES).map(value).collect())
-    }
-
-    #[test]
-    fn the_ordinates_of_one_fundamental_are_those_of_all() {
-        let blocks = series(1, 0.01, |turn| (7.3 * turn).fract()).averaged(16);
-        let (all, fundamental) = (PaddedSpectrum::new(&blocks).unwrap(), 7.3);
-        let few = PaddedSpectrum::at_harmonics(&blocks, fundamental).unwrap();
-        let orders = (0..=SAMPLES / 32).map(|order| order as f64);
-        let harmonics = (1..=HARMONICS).map(|number| number as f64 * fundamental);
-        let largest = all.power.iter().copied().fold(0.0, f64::max);
-        for order in orders.chain(harmonics) {
-            // Rounding of transforms of a thousand numbers.
-            assert!((few.density(order) - all.density(order)).abs() < 1e-12 * largest, "{order}");
-        }
-        assert!(all.orders(None, 512).eq(few.orders(None, 512)));
     }
 
     #[test]
@@ -377,7 +272,7 @@ mod tests {
     /// Nine of ten intervals hold: 31 of 40 but for one in 100 cases.
     #[test]
     fn all_harmonics_tell_the_frequency() {
-        let of_fundamental = NORMAL_975 * (1.5_f64 / 149.0).sqrt() / std::f64::consts::PI;
+        let of_fundamental = NORMAL_975 * (1.5_f64 / 149.0).sqrt() / PI;
         let (mut within, mut half) = (0, 0.0);
         for seed in 100..140 {
             let periods = 8.0 + 0.37 * (seed - 100) as f64;
@@ -399,7 +294,7 @@ mod tests {
         assert!(found.harmonics.len() >= 127, "{}", found.harmonics.len());
         for (number, amplitude) in (2..=64).map(f64::from).zip(&found.harmonics) {
             // Deviation √(2/n) of an amplitude; means of blocks keep 0.97.
-            let (expected, deviation) = (6.0 / (std::f64::consts::PI * number), (2.0 / SAMPLES as f64).sqrt());
+            let (expected, deviation) = (6.0 / (PI * number), (2.0 / SAMPLES as f64).sqrt());
             assert!((amplitude - expected).abs() < 4.0 * deviation + 0.03 * expected, "{number}: {amplitude}");
         }
         // √(π²/6 − 1) of the fundamental.

@@ -12,9 +12,11 @@ pub(super) const PADDING: usize = 2;
 /// Fraction of the record over which the taper rises and falls, against the end's jump in a filter's nulls.
 const RISE: f64 = 0.05;
 
-/// `2·dt/Σw²·|X(f)|²` under the taper `w`, at the multiples of half a resolution.
+/// `2·dt/Σw²·|X(f)|²` under the taper `w`, at the multiples of a fraction of the resolution.
 #[derive(Clone)]
 pub(super) struct Periodogram {
+    /// Ordinates per resolution.
+    padding: usize,
     /// Hz between ordinates.
     spacing: f64,
     density: Vec<f64>,
@@ -25,13 +27,18 @@ pub(super) struct Periodogram {
 impl Periodogram {
     /// Transforms samples without their straight line, with short gaps interpolated; drops up to 1 % at the end.
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
+        Self::padded_by(PADDING, series)
+    }
+
+    /// [`new`](Self::new) with `padding` ordinates per resolution.
+    pub(super) fn padded_by(padding: usize, series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
         let (filled, _) = series.interpolated();
         let values = &filled.values()[..length];
         if values.iter().filter(|value| value.is_finite()).count() < 2 {
             return None;
         }
-        let mut transform = BufferedTransform::new(PADDING * length);
+        let mut transform = BufferedTransform::new(padding * length);
         let mut power = 0.0;
         for (at, (slot, value)) in transform.input().iter_mut().zip(values).enumerate() {
             let weight = taper(at, length);
@@ -45,7 +52,8 @@ impl Periodogram {
         }
         let scale = 2.0 * series.sample_period() / power;
         Some(Self {
-            spacing: 1.0 / (PADDING as f64 * length as f64 * series.sample_period()),
+            padding,
+            spacing: 1.0 / (padding as f64 * length as f64 * series.sample_period()),
             density: transform.output()?.iter().map(|bin| scale * bin.norm_sqr()).collect(),
             looks: 1,
         })
@@ -69,15 +77,20 @@ impl Periodogram {
     }
 
     pub(super) fn resolution(&self) -> f64 {
-        PADDING as f64 * self.spacing
+        self.padding as f64 * self.spacing
     }
 
     /// Ordinates at multiples of the resolution, from 0 Hz: independent in white noise.
     pub(super) fn independent(&self) -> impl Iterator<Item = f64> {
-        self.density.iter().copied().step_by(PADDING)
+        self.density.iter().copied().step_by(self.padding)
     }
 
-    /// All ordinates, [`PADDING`] per resolution, from 0 Hz.
+    /// The ordinate nearest to an `order`, resolutions; 0 above the last one.
+    pub(super) fn at(&self, order: f64) -> f64 {
+        self.density.get((order * self.padding as f64).round() as usize).copied().unwrap_or(0.0)
+    }
+
+    /// All ordinates, [`PADDING`] per resolution unless [`padded_by`](Self::padded_by) others, from 0 Hz.
     pub(super) fn padded(&self) -> &[f64] {
         &self.density
     }

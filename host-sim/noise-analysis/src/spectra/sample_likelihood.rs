@@ -31,7 +31,7 @@ const POINTS_IN_BAND: usize = 8;
 const POINTS_IN_BAND_OF_MEANS: usize = 2;
 /// Weights of a point of Welch's spectrum and of its neighbours in what the density is averaged over: the squares of the transform of a
 /// Hann window.
-const HANN: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 6.0)];
+const HANN: [f64; 3] = [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0];
 /// Largest part of the density of filtered white noise that the ends of the record may leak.
 const MOST_LEAKAGE: f64 = 0.1;
 /// Least part of a density that a term has where the spectrum shows its shape.
@@ -173,8 +173,8 @@ pub(crate) struct SpectrumBehindFilter<'a> {
 impl SpectrumBehindFilter<'_> {
     /// With this filter in place of the first term: twice what the logarithm of the likelihood, with the likeliest coefficients, is below
     /// that of a spectrum that is as measured. A true model has about the number of [bands](SampleSpectrum::bands).
-    pub(crate) fn deviance(&self, filter: MovingAverageFilter) -> f64 {
-        2.0 * (self.likelihood.with_first(&Shapes::new(self.spectrum, &[NoiseTerm::Filtered(filter)])) - self.saturated)
+    pub(crate) fn deviance(&self, filtered: NoiseTerm) -> f64 {
+        2.0 * (self.likelihood.with_first(&Shapes::new(self.spectrum, &[filtered])) - self.saturated)
     }
 }
 
@@ -231,14 +231,26 @@ impl<'a> Shapes<'a> {
         self.all.iter().position(|shape| matches!(shape, Shape::Rounding(_)))
     }
 
-    /// The mean of a shape at a place of the spectrum.
-    fn at(&self, shape: Shape, place: &Place) -> f64 {
-        match place {
+    /// The mean of a shape in each band.
+    fn in_bands(&self, shape: Shape) -> Vec<f64> {
+        let bands = || self.spectrum.bands.iter();
+        let points = bands().filter_map(|band| match &band.place {
+            Place::Points(points) => Some(points.first().copied().zip(points.last().copied())?),
+            Place::Coefficients(_) => None,
+        });
+        let ends = points.reduce(|ends, next| (ends.0.min(next.0), ends.1.max(next.1)));
+        let (lowest, highest) = ends.map_or((1, 0), |(lowest, highest)| (lowest - 1, highest + 1));
+        let density = |point: usize| self.density(shape, point as f64 * self.spectrum.point_resolution);
+        let densities: Vec<f64> = (lowest..=highest).map(density).collect();
+        let at_point = |point: &usize| {
+            let beside = &densities[point - 1 - lowest..];
+            HANN.iter().zip(beside).map(|(weight, density)| weight * density).sum::<f64>()
+        };
+        let in_band = |band: &SampleBand| match &band.place {
             Place::Coefficients(indices) => self.at_coefficients(shape, indices),
-            Place::Points(points) => {
-                points.iter().map(|point| self.at_point(shape, *point)).sum::<f64>() / points.len() as f64
-            }
-        }
+            Place::Points(points) => points.iter().map(at_point).sum::<f64>() / points.len() as f64,
+        };
+        bands().map(in_band).collect()
     }
 
     /// The mean of a shape over coefficients of the cosine transform.
@@ -260,14 +272,6 @@ impl<'a> Shapes<'a> {
             (Shape::Term(NoiseTerm::BiasInstability), _) => density() * flicker_leakage(order),
             _ => density(),
         }
-    }
-
-    /// That of a shape at a point of Welch's spectrum.
-    fn at_point(&self, shape: Shape, point: usize) -> f64 {
-        let at = |(beside, weight): (f64, f64)| {
-            weight * self.density(shape, (point as f64 + beside) * self.spectrum.point_resolution)
-        };
-        HANN.map(at).iter().sum()
     }
 
     /// The density of the means: what they let through, with its aliases.
@@ -330,14 +334,12 @@ impl Likelihood {
     fn new(spectrum: &SampleSpectrum, kinds: &[NoiseTerm]) -> Self {
         let shapes = Shapes::new(spectrum, kinds);
         let bands: Vec<SpectralBand> = spectrum.bands.iter().map(|band| band.measured).collect();
-        let bases: Vec<Vec<f64>> = spectrum
-            .bands
-            .iter()
-            .map(|band| shapes.all.iter().map(|shape| shapes.at(*shape, &band.place)).collect())
-            .collect();
+        let columns: Vec<Vec<f64>> = shapes.all.iter().map(|shape| shapes.in_bands(*shape)).collect();
+        let row = |band: usize| columns.iter().map(|column| column[band]).collect();
+        let bases: Vec<Vec<f64>> = (0..bands.len()).map(row).collect();
+        let known = shapes.known();
         let mut densities = vec![0.0; shapes.all.len()];
         let mut objective = fit_mixture(&bands, &bases, Sign::NonNegative, &mut densities);
-        let known = shapes.known();
         if let Some(known) = known {
             densities[known] = 1.0;
             objective = fit_mixture_with(&bands, &bases, Sign::NonNegative, &[known], &mut densities);
@@ -345,19 +347,11 @@ impl Likelihood {
         Self { bands, bases, densities, objective, known }
     }
 
-    /// The objective at its minimum with another shape in place of the first one, which is not much different: the first of `shapes`.
+    /// The objective at its minimum with another shape in place of the first one: the first of `shapes`.
     fn with_first(&self, shapes: &Shapes) -> f64 {
-        let of = shapes.spectrum.bands.iter().map(|band| shapes.at(shapes.all[0], &band.place));
-        let bases: Vec<Vec<f64>> = self
-            .bases
-            .iter()
-            .zip(of)
-            .map(|(basis, first)| {
-                let mut basis = basis.clone();
-                basis[0] = first;
-                basis
-            })
-            .collect();
+        let mut bases = self.bases.clone();
+        let first = shapes.in_bands(shapes.all[0]);
+        bases.iter_mut().zip(first).for_each(|(basis, first)| basis[0] = first);
         let held: Vec<usize> = self.known.into_iter().collect();
         fit_mixture_with(&self.bands, &bases, Sign::NonNegative, &held, &mut self.densities.clone())
     }

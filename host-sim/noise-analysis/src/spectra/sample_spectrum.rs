@@ -27,6 +27,10 @@ const BANDS: usize = 512;
 /// Coefficients, and points of Welch's spectrum, on either side of a line that are left out.
 const LINE_COEFFICIENTS: f64 = 8.0;
 const LINE_POINTS: f64 = 4.0;
+/// Neighbouring bands of Welch's spectrum that are one where it is used alone: the nulls of 2 × 64 taps are two of these apart.
+const JOINED: usize = 2;
+/// Rounds in which the harmonic mean of a density is found, each of which leaves less than half of the error.
+const HARMONIC_ROUNDS: usize = 10;
 /// Part of the rate of means up to which their coefficients are used, and the lowest point of Welch's spectrum: below, the window
 /// spreads drift over several points.
 const OF_MEANS: f64 = 0.25;
@@ -76,8 +80,35 @@ impl SampleSpectrum {
         let below = OF_MEANS / means.sample_period();
         let mut spectrum = Self::of_values(means, samples_per_mean, lines, below)?;
         spectrum.point_resolution = welch.resolution();
-        spectrum.bands.extend(bands_of_points(welch, lines, below.max(LOWEST_POINT * welch.resolution())));
+        spectrum.bands.extend(bands_of_points(welch, lines, below.max(LOWEST_POINT * welch.resolution()), 1));
         Some(spectrum)
+    }
+
+    /// Of Welch's spectrum of samples with this rounding alone, in which also long gaps are left out; `lines` are at these frequencies in Hz.
+    ///
+    /// The error of the best interpolation is uncorrelated with all other samples, and its variance is the harmonic mean of the density: a share
+    /// of `interpolated` samples lacks as much white noise.
+    pub(crate) fn of_welch(welch: &Welch, rounding: &Rounding, lines: &[f64], interpolated: f64) -> Self {
+        let mut bands: Vec<SampleBand> =
+            bands_of_points(welch, lines, LOWEST_POINT * welch.resolution(), JOINED).collect();
+        let measured: Vec<(f64, f64)> = bands.iter().map(|of| (of.measured.ordinates, of.measured.density)).collect();
+        for _ in 0..if interpolated > 0.0 { HARMONIC_ROUNDS } else { 0 } {
+            let inverse = |of: &SampleBand| of.measured.ordinates / of.measured.density.max(f64::MIN_POSITIVE);
+            let ordinates: f64 = measured.iter().map(|(ordinates, _)| ordinates).sum();
+            let error = ordinates / bands.iter().map(inverse).sum::<f64>();
+            let complete = |density: f64| density + interpolated * (error - density);
+            bands.iter_mut().zip(&measured).for_each(|(band, (_, density))| band.measured.density = complete(*density));
+        }
+        Self {
+            bands,
+            count: 0,
+            samples_per_mean: 1,
+            period: welch.sample_period(),
+            resolution: welch.resolution(),
+            point_resolution: welch.resolution(),
+            rounding: rounding.clone(),
+            interpolated,
+        }
     }
 
     /// Whether at most a thousandth of the samples is interpolated.
@@ -129,8 +160,8 @@ impl SampleSpectrum {
     }
 }
 
-/// The bands of Welch's spectrum above a frequency.
-fn bands_of_points(welch: &Welch, lines: &[f64], above: f64) -> impl Iterator<Item = SampleBand> {
+/// The bands of Welch's spectrum above a frequency, so many of them `joined`.
+fn bands_of_points(welch: &Welch, lines: &[f64], above: f64, joined: usize) -> impl Iterator<Item = SampleBand> {
     let reach = LINE_POINTS * welch.resolution();
     let is_line = |frequency: f64| lines.iter().any(|line| (frequency - line).abs() < reach);
     let band = |points: Vec<usize>| {
@@ -139,7 +170,8 @@ fn bands_of_points(welch: &Welch, lines: &[f64], above: f64) -> impl Iterator<It
         let measured = SpectralBand { density: average.density / 2.0, ..average };
         SampleBand { measured, place: Place::Points(points) }
     };
-    welch.band_points((above / welch.resolution()).ceil() as usize, is_line).into_iter().map(band)
+    let bands = welch.band_points((above / welch.resolution()).ceil() as usize, is_line);
+    bands.chunks(joined).map(<[Vec<usize>]>::concat).map(band).collect::<Vec<SampleBand>>().into_iter()
 }
 
 /// Squares of the coefficients of the cosine transform of `values` around `mean`, of the orders 1, 2, 3 …, normalised so that those of

@@ -17,12 +17,6 @@ const MERGE_DISTANCE: f64 = 0.03;
 const MERGE_WIDTHS: f64 = 3.0;
 /// Distance of peaks of one line, in resolutions: side lobes.
 const MERGE_RESOLUTIONS: f64 = 8.0;
-/// Distance, resolutions, beyond the taper's side lobes, and largest difference of sidebands' distances.
-const LOBE_RESOLUTIONS: f64 = 2.5;
-const SIDEBAND_TOLERANCE: f64 = 0.5;
-/// Largest relative difference of equal peaks, and in standard deviations.
-const SIDEBAND_RATIO: f64 = 0.25;
-const SIDEBAND_SIGMAS: f64 = 3.0;
 /// Least frequency of a line in widths; below is a Markov process.
 const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
 /// Least noise of the model over that of its Markov processes: rounding remains in a filter's nulls.
@@ -37,6 +31,7 @@ const NARROWEST_BAND: f64 = 0.01;
 pub(crate) const FEW_PERIODS: f64 = 8.0;
 /// Full width at half maximum of a normal curve, in standard deviations.
 const FULL_WIDTH: f64 = 2.35;
+
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MergedLine {
     /// Weighted by power, Hz.
@@ -65,7 +60,7 @@ pub(crate) fn before_averaging(line: &MergedLine, width: f64, m: u64) -> Measure
 }
 
 /// Gain of the mean of `m` samples over `width` s at `frequency`, Hz: `sin(πfw)/(m·sin(πfw/m))`.
-fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
+pub(super) fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
     let (phase, m) = (PI * frequency * width, m as f64);
     phase.sin() / (m * (phase / m).sin())
 }
@@ -119,14 +114,8 @@ pub(crate) fn merged(
             distance < reach || (wanders && distance < MERGE_DISTANCE * strongest.frequency.value)
         };
         let (same, others): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_same);
-        let line = MergedLine { duration_s, ..MergedLine::merge(&same, resolved_s, rate_error) };
+        lines.push(MergedLine::merge(&same, duration_s, rate_error));
         rest = others;
-        if let Some(change) = line.modulation {
-            let is_weaker = |peak: &spectra::SpectralLine| peak.deviation.value < strongest.deviation.value;
-            let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
-            rest.retain(|peak| !(is_weaker(peak) && change.is_sideband(distance(peak), duration_s)));
-        }
-        lines.push(line);
     }
     lines
 }
@@ -157,34 +146,11 @@ pub(crate) fn is_read_slowly(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Filtered(filter) if filter.decimation > 1.0)
 }
 
-/// The modulation of the strongest of `peaks`, if the sinusoids on either side are equally far and equally strong.
-fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -> Option<spectra::Modulation> {
-    let [strongest, one, other, ..] = peaks else { return None };
-    let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
-    let is_symmetric = (distance(one) + distance(other)).abs() < SIDEBAND_TOLERANCE / duration_s;
-    let is_beside = [one, other].iter().all(|peak| distance(peak).abs() > LOBE_RESOLUTIONS / duration_s);
-    let difference = (one.deviation.value - other.deviation.value).abs();
-    let error = one.deviation.error.hypot(other.deviation.error);
-    let mean = 0.5 * (one.deviation.value + other.deviation.value);
-    let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
-    let are_sinusoids = [strongest, one, other].iter().all(|peak| peak.width.is_none());
-    // A sideband has half the depth.
-    let over_line = 2.0 / strongest.deviation.value;
-    (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| spectra::Modulation {
-        frequency: MeasuredValue {
-            value: 0.5 * (distance(one) - distance(other)).abs(),
-            error: 0.5 * one.frequency.error.hypot(other.frequency.error),
-        },
-        of_line: strongest.deviation.value / deviation,
-        depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
-        of_phase: false,
-        statistic: one.statistic + other.statistic,
-        with_multiples: one.statistic + other.statistic,
-    })
-}
-
 impl MergedLine {
     fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
+        let strongest = peaks[0];
+        // What is left of sidebands is no part of the line between them.
+        let peaks = if strongest.modulation.is_some() { &peaks[..1] } else { peaks };
         let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
         let total: f64 = peaks.iter().map(power).sum();
         let mean = |of: &dyn Fn(&spectra::SpectralLine) -> f64| {
@@ -194,7 +160,6 @@ impl MergedLine {
         let spread = mean(&|peak| (peak.frequency.value - frequency).powi(2)).sqrt();
         let own_width = mean(&|peak| width(peak));
         let width_error = mean(&|peak| peak.width.map_or(0.0, |width| width.error));
-        let strongest = peaks[0];
         Self {
             frequency: MeasuredValue {
                 value: frequency,
@@ -208,7 +173,7 @@ impl MergedLine {
             statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
-            modulation: sidebands(peaks, total.sqrt(), duration_s).or(strongest.modulation),
+            modulation: strongest.modulation,
             is_resonance: strongest.width.is_some(),
             duration_s,
         }

@@ -4,6 +4,7 @@
 //! as for all of the record; a resonance no larger.
 
 use super::alternation::Alternation;
+use super::line_envelope::Modulation;
 use super::lines::MOST;
 use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
 use crate::robust::median;
@@ -115,8 +116,22 @@ impl StackedSpectrum {
         let others = resonances.iter().map(|resonance| resonance.line).chain(at_half_the_rate);
         let mut lines: Vec<SpectralLine> = sinusoids.into_iter().chain(others).collect();
         lines.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
-        lines
+        with_modulations(lines, spectrum.periodogram.resolution())
     }
+}
+
+/// The lines, of which the strongest are first, without the sidebands of others.
+fn with_modulations(mut rest: Vec<SpectralLine>, resolution: f64) -> Vec<SpectralLine> {
+    let mut lines = Vec::new();
+    while !rest.is_empty() {
+        let mut line = rest.remove(0);
+        let mut sides =
+            rest.iter().enumerate().flat_map(|(at, one)| rest[at + 1..].iter().map(move |other| [one, other]));
+        line.modulation = sides.find_map(|sides| Modulation::by_sidebands(&line, sides, resolution));
+        rest.retain(|other| !line.has_sideband(other, 1.0 / resolution));
+        lines.push(line);
+    }
+    lines
 }
 
 #[cfg(test)]
@@ -171,6 +186,22 @@ mod tests {
         }
         // 6 or fewer of ten have a probability of 10⁻³.
         assert!(frequencies > 6 && deviations > 6, "{frequencies} {deviations}");
+    }
+
+    /// Sidebands of a quarter of the amplitude, more than 2.5 resolutions from the line.
+    #[test]
+    fn two_sidebands_are_a_change_of_their_line() {
+        let resolution = 1.0 / (0.01 * STRETCH as f64);
+        for changes in [4.0, 7.0, 20.0] {
+            let found = lines(1, |time_s| {
+                let change = 1.0 + 0.5 * (TAU * changes * resolution * time_s).sin();
+                0.2 * change * (TAU * 23.4567 * time_s).sin()
+            });
+            let [line] = found[..] else { panic!("{changes}: {found:?}") };
+            let change = line.modulation.expect("two sidebands");
+            assert!((change.frequency.value / resolution - changes).abs() < 0.25, "{changes}: {change:?}");
+            assert!((change.depth.value - 0.5).abs() < 4.0 * change.depth.error, "{changes}: {change:?}");
+        }
     }
 
     /// At 20 Hz, 0.5 Hz wide.

@@ -1,5 +1,6 @@
 //! A spectrum over its background, and its peaks.
 
+use super::found_sines::FoundSine;
 use super::line_envelope::Modulation;
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
@@ -7,6 +8,7 @@ use super::smooth_shape::{Background, Filters, LocalLevel, WINDOW};
 use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
+use crate::minimum::summit;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use std::cell::OnceCell;
@@ -96,10 +98,17 @@ impl SpectralLine {
         let root = 2f64.sqrt();
         MeasuredValue { value: root * self.deviation.value, error: root * self.deviation.error }
     }
+
+    /// True if a weaker line is a sideband of this one in a record of `duration`, s.
+    pub(super) fn has_sideband(&self, other: &Self, duration: f64) -> bool {
+        let distance = other.frequency.value - self.frequency.value;
+        other.deviation.value < self.deviation.value
+            && self.modulation.is_some_and(|change| change.is_sideband(distance, duration))
+    }
 }
 
 pub(super) enum Candidate {
-    Sine(SpectralLine, Sine),
+    Sine(FoundSine),
     Resonance(Resonance),
 }
 
@@ -203,26 +212,23 @@ impl<'a> WhitenedSpectrum<'a> {
     }
 
     pub(super) fn most_significant(&self, series: &UniformSeries) -> Option<Candidate> {
-        let sine = self.strongest_sine(series).filter(|(line, _)| line.p_value < SIGNIFICANCE);
-        if let Some((line, sine)) = sine {
-            let bin = line.frequency.value / self.resolution;
+        if let Some(found) = self.strongest_sine(series).filter(|found| found.p_value < SIGNIFICANCE) {
+            let bin = found.sine.frequency / self.resolution;
             let widths =
                 (0..).map(|power| 2f64.powi(2 * power)).take_while(|width| *width < self.ordinates.len() as f64 / 32.0);
             // A modulated sinusoid is a band of a few lines.
-            let change = || {
-                let density = 2.0 * sine.density(series) / line.statistic;
-                Modulation::find(&sine, &sine.subtracted_from(series), density, |_| false)
-            };
+            let change =
+                || Modulation::find(&found.sine, &found.sine.subtracted_from(series), found.density, |_| false);
             let is_likelier = |lorentz: &Lorentz| {
-                let over_sine = lorentz.statistic - line.statistic;
+                let over_sine = lorentz.statistic - 2.0 * found.over_noise(series);
                 over_sine > PREFERENCE
                     && change().is_none_or(|change| over_sine > change.with_multiples - COST_OF_A_CHANGE)
             };
             return Some(match self.resonance(bin, widths).filter(is_likelier) {
                 Some(lorentz) => {
-                    Candidate::Resonance(Resonance { line: self.resonance_line(&lorentz, line.p_value), lorentz })
+                    Candidate::Resonance(Resonance { line: self.resonance_line(&lorentz, found.p_value), lorentz })
                 }
-                None => Candidate::Sine(line, sine),
+                None => Candidate::Sine(found),
             });
         }
         let (bin, width, p_value) = self.broad_peak(1)?;
@@ -231,7 +237,7 @@ impl<'a> WhitenedSpectrum<'a> {
     }
 
     /// The sinusoid with the largest likelihood ratio.
-    fn strongest_sine(&self, series: &UniformSeries) -> Option<(SpectralLine, Sine)> {
+    fn strongest_sine(&self, series: &UniformSeries) -> Option<FoundSine> {
         let mut peaks: Vec<(f64, usize)> = self.peaks();
         let highest_first = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
         if peaks.len() > FITTED_PEAKS {
@@ -249,11 +255,10 @@ impl<'a> WhitenedSpectrum<'a> {
             let bin = sine.frequency / self.resolution;
             let level = self.background.level(self.whitened(), at / PADDING);
             let background = (level.value * self.background.shape_at(bin)).max(self.floor_at(bin));
-            let ratio = sine.density(series) * self.deflation_at(at) / background;
-            (ratio, level, sine)
+            let density = background / self.deflation_at(at);
+            FoundSine { sine, density, p_value: self.sine_p_value(sine.density(series) / density, level) }
         });
-        let (ratio, level, sine) = candidates.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((sine_line(&sine, series.duration(), ratio, self.sine_p_value(ratio, level)), sine))
+        candidates.max_by(|a, b| a.over_noise(series).total_cmp(&b.over_noise(series)))
     }
 
     /// Maxima of the padded ordinates above four times the local level, over it, with positions.
@@ -356,9 +361,7 @@ impl<'a> WhitenedSpectrum<'a> {
         let highest = near.max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
         let level = self.background.level(self.whitened(), highest / PADDING).value;
         // ln of a taper's main lobe is nearly a parabola.
-        let [left, here, right] = [highest - 1, highest, highest + 1].map(|at| padded[at].ln());
-        let curvature = 2.0 * here - left - right;
-        let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
+        let shift = summit([highest - 1, highest, highest + 1].map(|at| padded[at].ln())).clamp(-0.5, 0.5);
         let centre = (highest as f64 + shift) / PADDING as f64;
         let exceeds = |at: &usize| padded[*at] > level * (1.0 + EXCEEDS / self.independent.sqrt());
         let below = (1..highest).rev().take(MOST_REACHED).take_while(exceeds).count().max(PADDING).min(highest - 1);
@@ -440,20 +443,6 @@ fn neighbourhoods(averages: &[f64], size: usize, looks: f64) -> Vec<LocalLevel> 
         LocalLevel { value, ordinates: (window.len() * size) as f64 * 2.0 / PI }
     };
     (0..averages.len()).map(&mut level).collect()
-}
-
-/// A sinusoid whose ordinate is `ratio` times the background.
-pub(super) fn sine_line(sine: &Sine, duration: f64, ratio: f64, p_value: f64) -> SpectralLine {
-    let amplitude = sine.amplitude();
-    SpectralLine {
-        frequency: MeasuredValue { value: sine.frequency, error: 1.5f64.sqrt() / (PI * duration * ratio.sqrt()) },
-        deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
-        width: None,
-        statistic: 2.0 * ratio,
-        p_value,
-        shape_p_value: 1.0,
-        modulation: None,
-    }
 }
 
 /// Part of the ordinates that count as independent: `(Σv)²/Σv²` with the variance v of each sample, 0 if missing.

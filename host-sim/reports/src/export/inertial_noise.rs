@@ -1,17 +1,17 @@
 //! The noise of gyroscopes and accelerometers in SI units, axis by axis.
 
 use super::exported_file::{AxisChoice, ExportError};
+use crate::coefficients::KINDS;
 use crate::rounding::is_upper_bound;
-use crate::saved_report::{SavedChannel, SavedParameter, SavedPoint, SavedReport, SavedTerm};
+use crate::saved_report::{SavedChannel, SavedReport, SavedTerm};
 use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
 use noise_analysis::fit::gauss_markov::{self, GaussMarkovFit, SlowNoise, SlowOctave};
+use noise_analysis::report::{CurvePoint, Parameter};
 
 /// Standard gravity, m/s².
 pub(super) const GRAVITY: f64 = 9.806_65;
-
-const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sensor {
@@ -91,7 +91,7 @@ impl Sensor {
 
 /// `None` if the upper bound is zero.
 fn coefficient(channel: &SavedChannel, kind: &str, to_si: f64) -> Option<Coefficient> {
-    let SavedParameter { value, low, high, .. } = channel.coefficient(kind)?;
+    let Parameter { value, low, high, .. } = channel.coefficient(kind)?;
     let is_bound = is_upper_bound(value, low) && high.is_finite();
     let shown = if is_bound { high } else { value };
     let is_number = shown > 0.0 && shown.is_finite();
@@ -129,7 +129,7 @@ fn slow_noise(axis: &AxisNoise<'_>, period: f64) -> SlowNoise {
         }
     }
     let model = Model::new(period, terms);
-    let octave = |(point, adev): (&SavedPoint, &f64)| {
+    let octave = |(point, adev): (&CurvePoint, &f64)| {
         let slow = model.avar(point.n);
         SlowOctave { n: point.n, model: f64::max(adev * adev * to_si * to_si, slow), slow, edf: point.edf }
     };

@@ -1,6 +1,6 @@
 //! An axis of a figure: linear or logarithmic, with its ticks at round values.
 
-use crate::rounding::{column_prefix, significant};
+use crate::rounding::{column_prefix, extremes, significant};
 
 /// Values from `from` to `to` along pixels from `start` to `end`.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,22 +30,19 @@ const MOST_DECADES: f64 = 40.0;
 impl Axis {
     /// Logarithmic over the `values` it can show, a twentieth wider at both ends.
     pub(super) fn logarithmic(label: &str, values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Self {
-        let logs = values.filter(|value| has_logarithm(*value)).map(f64::log10);
-        let (mut low, mut high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), of| (of.min(a), of.max(b)));
+        let (mut low, mut high) = extremes(values.filter(|value| has_logarithm(*value)).map(f64::log10));
         if !(low.is_finite() && high.is_finite()) {
             (low, high) = (0.0, 1.0);
         }
         low = low.max(high - MOST_DECADES);
         let margin = 0.05 * (high - low) + ((LEAST_DECADES - (high - low)) / 2.0).max(0.0);
-        let limit = |log: f64| 10f64.powf(log.clamp(-300.0, 300.0));
-        let (from, to) = (limit(low - margin), limit(high + margin));
+        let [from, to] = [low - margin, high + margin].map(|log| 10f64.powf(log.clamp(-300.0, 300.0)));
         Self { label: label.to_owned(), is_logarithmic: true, from, to, start: pixels[0], end: pixels[1] }
     }
 
     /// Linear over `values`, a twentieth wider at both ends.
     pub(super) fn linear(label: &str, values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Self {
-        let finite = values.filter(|value| value.is_finite());
-        let (mut low, mut high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), of| (of.min(a), of.max(b)));
+        let (mut low, mut high) = extremes(values.filter(|value| value.is_finite()));
         if !(low.is_finite() && high.is_finite() && (high - low).is_finite()) {
             (low, high) = (0.0, 1.0);
         }
@@ -66,14 +63,24 @@ impl Axis {
     /// `None` outside of the axis.
     pub(super) fn at(&self, value: f64) -> Option<f64> {
         let pixel = self.unbounded(value)?;
-        let (low, high) = (self.start.min(self.end), self.start.max(self.end));
+        let (low, high) = self.ends();
         (low - 0.5..=high + 0.5).contains(&pixel).then_some(pixel)
+    }
+
+    fn ends(&self) -> (f64, f64) {
+        (self.start.min(self.end), self.start.max(self.end))
+    }
+
+    /// Up to one axis length outside.
+    pub(super) fn unclipped(&self, value: f64) -> Option<f64> {
+        let (low, high) = self.ends();
+        self.unbounded(value).map(|pixel| pixel.clamp(2.0 * low - high, 2.0 * high - low))
     }
 
     /// Moved to the nearer end if outside.
     pub(super) fn clamped(&self, value: f64) -> Option<f64> {
         let value = if self.is_logarithmic && value == 0.0 { self.from } else { value };
-        let (low, high) = (self.start.min(self.end), self.start.max(self.end));
+        let (low, high) = self.ends();
         self.unbounded(value).map(|pixel| pixel.clamp(low, high))
     }
 

@@ -2,9 +2,10 @@
 
 use super::axis::{Axis, has_logarithm};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, frames, heights, places};
+use super::{TAU, deviation_label};
 use crate::finding_text::channel_name;
 use crate::formatting::{capital, words};
-use crate::rounding::{NONE, quantity, quantity_digits, span, unit};
+use crate::rounding::{NONE, extremes, quantity, span, unit};
 use crate::summary::{self, off_percent};
 use allan_core::model::{FittedTerm, cube_root_deviation};
 use allan_core::{Model, NoiseTerm};
@@ -27,57 +28,50 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     lines.push(model_line(channel, &channel.refitted, "model of the whole record", Look::Model));
     lines.push(data);
     let [curve, residual] = frames([330.0, 120.0]).map(|frame| below_legend(frame, &lines));
-    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let across = Axis::logarithmic(TAU, lines.iter().flat_map(places), [LEFT, RIGHT]);
     // Terms may lead out of the panel, except the flat line of B.
     let shown = lines.iter().filter(|line| line.look != Look::Term || is_flat(line)).flat_map(heights);
-    let up = Axis::logarithmic(&format!("Allan deviation σ(τ), {}", unit(&channel.unit)), shown, curve);
+    let up = Axis::logarithmic(&deviation_label(&channel.unit), shown, curve);
     lines.extend(slopes(channel).into_iter().flatten());
     let lower = residual_panel(channel, has_terms, across.clone(), residual);
     let description = format!("{} {}", describe(channel), describe_slopes(channel));
-    Plot {
-        id: format!("{}-allan", channel.name),
-        title: format!("{} · Allan deviation", channel_name(channel)),
-        description,
-        panels: vec![Panel::new(across, up, lines), lower],
-    }
+    of_channel(channel, "allan", "Allan deviation", description, [Panel::new(across, up, lines), lower])
+}
+
+fn of_channel<const PANELS: usize>(
+    channel: &ChannelReport,
+    id: &str,
+    title: &str,
+    description: String,
+    panels: [Panel; PANELS],
+) -> Plot {
+    Plot::new(format!("{}-{id}", channel.name), format!("{} · {title}", channel_name(channel)), description, panels)
 }
 
 /// The measured curve, both models fitted to the first half, and their errors on the second.
 pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
+    let models = summary::models(channel);
+    let first = if is_lowered { "before: N, B, K" } else { "model: N, B, K" };
     let mut lines = vec![
-        model_line(
-            channel,
-            &channel.before,
-            if is_lowered { "before: N, B, K" } else { "model: N, B, K" },
-            Look::Before,
-        ),
+        model_line(channel, models[0], first, Look::Before),
         measured(channel, Look::Measured, "measured, whole record"),
     ];
     if is_lowered {
-        lines.insert(1, model_line(channel, &channel.after, "after: with effects", Look::Model));
+        lines.insert(1, model_line(channel, models[1], "after: with effects", Look::Model));
     }
-    let unseen: Vec<(f64, f64)> = channel
-        .curve
-        .iter()
-        .zip(&channel.unseen_adev)
-        .map(|(point, &adev)| (point.tau_s, adev))
-        .filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev))
-        .collect();
+    let unseen = deviations(channel, &channel.unseen_adev);
     if !unseen.is_empty() {
-        let name = "second half, not seen by the fit";
-        lines.push(Line::new(name, Look::Reference, unseen).with_dots().unjoined());
+        lines.push(Line::new("second half, not seen by the fit", Look::Reference, unseen).dotted());
     }
     let [frame] = frames([270.0]).map(|frame| below_legend(frame, &lines));
-    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let label = format!("Allan deviation σ(τ), {}", unit(&channel.unit));
+    let across = Axis::logarithmic(TAU, lines.iter().flat_map(places), [LEFT, RIGHT]);
     let terms = terms(report, channel);
     let level = terms.iter().filter(|line| is_flat(line)).flat_map(heights);
-    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights).chain(level), frame);
+    let up = Axis::logarithmic(&deviation_label(&channel.unit), lines.iter().flat_map(heights).chain(level), frame);
     lines.splice(0..0, terms);
     let name = capital(&channel_name(channel));
-    let [before, after] = [&channel.before, &channel.after]
-        .map(|model| model.unseen.rms_percent.map_or_else(|| NONE.to_owned(), off_percent));
+    let [before, after] = models.map(|model| model.unseen.rms_percent.map_or_else(|| NONE.to_owned(), off_percent));
     let (title, description) = if is_lowered {
         (
             format!("{name}: σ is off by {before} % without what was found, by {after} % with it"),
@@ -89,20 +83,15 @@ pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, afte
             "The model is fitted to the first half; the error is that on the second, which it had not seen. No effect lowers it.",
         )
     };
-    let description = description.to_owned();
-    Plot { id: "story".to_owned(), title, description, panels: vec![Panel::new(across, up, lines)] }
+    Plot::new("story", title, description, [Panel::new(across, up, lines)])
 }
 
 /// Slopes of N at 1 s, B at the minimum and K at 3 s, over a factor of four to both sides and to the curve.
 fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
     let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
     let line = |slope: &str, found: &SlopeMethodValue, at_s: f64, deviation: &dyn Fn(f64) -> f64| {
-        let (mut from, mut to) = (0.25 * at_s, 4.0 * at_s);
-        if found.to_s < from {
-            from = found.from_s;
-        } else if found.from_s > to {
-            to = found.to_s;
-        }
+        let from = if found.to_s < 0.25 * at_s { found.from_s } else { 0.25 * at_s };
+        let to = if found.from_s > 4.0 * at_s { found.to_s } else { 4.0 * at_s };
         let octaves = (to / from).log2().ceil().clamp(1.0, 64.0) as i32;
         let points = (0..=octaves).map(|step| from * (to / from).powf(f64::from(step) / f64::from(octaves)));
         let points: Vec<(f64, f64)> = points.map(|tau| (tau, deviation(tau))).collect();
@@ -151,8 +140,13 @@ fn describe(channel: &ChannelReport) -> String {
 }
 
 pub(super) fn model_line(channel: &ChannelReport, model: &ModelReport, name: &str, look: Look) -> Line {
-    let pairs = channel.curve.iter().map(|point| point.tau_s).zip(model.adev.iter().copied());
-    Line::new(name, look, pairs.filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect())
+    Line::new(name, look, deviations(channel, &model.adev))
+}
+
+/// Averaging time and deviation, as far as both have logarithms.
+fn deviations(channel: &ChannelReport, adev: &[f64]) -> Vec<(f64, f64)> {
+    let pairs = channel.curve.iter().map(|point| point.tau_s).zip(adev.iter().copied());
+    pairs.filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect()
 }
 
 /// The terms of the model to use; N, B and K with numbers.
@@ -214,21 +208,14 @@ fn residual_panel(channel: &ChannelReport, has_terms: bool, across: Axis, frame:
     if has_terms {
         lines.push(Line::new("before", Look::Before, before).unlisted());
     }
-    lines.push(Line::new("residual of the model", Look::Measured, left).with_dots().unjoined().unlisted());
+    lines.push(Line::new("residual of the model", Look::Measured, left).dotted().unlisted());
     Panel::new(across, up, lines)
 }
 
 fn traced_lines(report: &Report, channel: &ChannelReport) -> Vec<Place> {
-    let of = |finding: &Finding| {
-        let frequency = finding.effect.frequency_hz()?.value;
-        Some(Place { label: quantity_digits(frequency, "Hz", 3), from: frequency, to: frequency })
-    };
-    report
-        .findings
-        .iter()
-        .filter(|finding| finding.effect.is_line() && finding.channels.contains(&channel.name))
-        .filter_map(of)
-        .collect()
+    let is_line = |finding: &&Finding| finding.effect.is_line() && finding.channels.contains(&channel.name);
+    let lines = report.findings.iter().filter(is_line);
+    lines.filter_map(|finding| Some(Place::at_frequency(finding.effect.frequency_hz()?.value))).collect()
 }
 
 /// The spectrum with bounds, traced lines and the filtered model; `None` without one.
@@ -243,10 +230,7 @@ pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<
         Line::new("measured, 95 % bounds", Look::Measured, along(&spectrum.density)).with_bounds(bounds),
         Line::new("model with the filter, without lines", Look::Model, model),
     ];
-    let [frame] = frames([300.0]);
-    let across = Axis::logarithmic("frequency, Hz", lines.iter().flat_map(places), [LEFT, RIGHT]);
     let label = format!("root of the spectrum, {}/√Hz", unit(&channel.unit));
-    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
     let traced = traced_lines(report, channel);
     let names: Vec<&str> = traced.iter().map(|place| place.label.as_str()).collect();
     let description = if names.is_empty() {
@@ -254,13 +238,8 @@ pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<
     } else {
         format!("Lines were traced at {}.", names.join(", "))
     };
-    let panel = Panel { places: traced, ..Panel::new(across, up, lines) };
-    Some(Plot {
-        id: format!("{}-spectrum", channel.name),
-        title: format!("{} · spectrum", channel_name(channel)),
-        description,
-        panels: vec![panel],
-    })
+    let panel = Panel::logarithmic("frequency, Hz", &label, lines, frames([300.0])[0]).with_places(traced);
+    Some(of_channel(channel, "spectrum", "spectrum", description, [panel]))
 }
 
 /// The bias over time with its covariates, and the rest beneath; `None` without one.
@@ -276,33 +255,26 @@ pub(crate) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
     if follows {
         upper.push(Line::new("what it follows", Look::Followed, along(&bias.followed)));
     }
-    let axis =
-        |label: String, lines: &[Line], frame: [f64; 2]| Axis::linear(&label, lines.iter().flat_map(heights), frame);
-    let across = Axis::linear(&format!("time, {per}"), upper.iter().flat_map(places), [LEFT, RIGHT]);
-    let name = unit(&channel.unit);
-    let mut panels = Vec::new();
-    if follows {
-        let rest: Vec<f64> = bias.mean.iter().zip(&bias.followed).map(|(mean, followed)| mean - followed).collect();
-        let [above, below] = frames([190.0, 150.0]);
-        let lower = vec![Line::new("left", Look::Model, along(&rest))];
-        panels.push(Panel::new(across.clone(), axis(format!("bias, {name}"), &upper, above), upper));
-        panels.push(Panel::new(across, axis(format!("left, {name}"), &lower, below), lower));
-    } else {
-        let [frame] = frames([210.0]);
-        panels.push(Panel::new(across, axis(format!("bias, {name}"), &upper, frame), upper));
+    let (time, name) = (format!("time, {per}"), unit(&channel.unit));
+    let panel = |what: &str, lines, frame| Panel::linear(&time, &format!("{what}, {name}"), lines, frame);
+    let (low, high) = extremes(bias.mean.iter().copied());
+    let range = quantity(high - low, &channel.unit);
+    let description = format!("Means of {} less the mean of the record, over a range of {range}", span(bias.block_s));
+    let title = "bias over time";
+    if !follows {
+        return Some(of_channel(
+            channel,
+            "bias",
+            title,
+            format!("{description}."),
+            [panel("bias", upper, frames([210.0])[0])],
+        ));
     }
-    let (low, high) = bias.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &of| (a.min(of), b.max(of)));
-    Some(Plot {
-        id: format!("{}-bias", channel.name),
-        title: format!("{} · bias over time", channel_name(channel)),
-        description: format!(
-            "Means of {} less the mean of the record, over a range of {}{}.",
-            span(bias.block_s),
-            quantity(high - low, &channel.unit),
-            if follows { "; with what the findings explain of it, and what is left" } else { "" }
-        ),
-        panels,
-    })
+    let rest: Vec<f64> = bias.mean.iter().zip(&bias.followed).map(|(mean, followed)| mean - followed).collect();
+    let [above, below] = frames([190.0, 150.0]);
+    let lower = panel("left", vec![Line::new("left", Look::Model, along(&rest))], below);
+    let description = format!("{description}; with what the findings explain of it, and what is left.");
+    Some(of_channel(channel, "bias", title, description, [panel("bias", upper, above), lower]))
 }
 
 pub(super) fn time_unit(length_s: f64) -> (f64, &'static str) {
@@ -317,5 +289,5 @@ pub(super) fn measured(channel: &ChannelReport, look: Look, name: &str) -> Line 
     let shown = || channel.curve.iter().filter(|point| has_logarithm(point.tau_s) && has_logarithm(point.adev));
     let points = shown().map(|point| (point.tau_s, point.adev)).collect();
     let bounds = shown().map(|point| (point.low, point.high)).collect();
-    Line::new(name, look, points).with_bounds(bounds).with_dots().unjoined()
+    Line::new(name, look, points).with_bounds(bounds).dotted()
 }

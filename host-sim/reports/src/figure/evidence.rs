@@ -1,21 +1,20 @@
 //! The picture of a finding's evidence: line, time, covariate, histogram, or residual.
 
+use super::LOOKS;
 use super::axis::Axis;
 use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
-use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, frames, heights, places};
+use super::plot::{Line, Look, Panel, Place, Plot, below_legend, frames, heights};
 use crate::finding_text::{channel_list, channel_name, shown_effects};
 use crate::formatting::words;
-use crate::rounding::{bounded_quantity, quantity_digits, span, unit};
+use crate::rounding::{bounded_quantity, extremes, span, unit};
 use noise_analysis::effects::{
     Effect, LevelChange, LevelStep, ModulatedLine, MotionInterval, NoisyInterval, Periodic, ResonantLine,
     SinusoidalLine, SquareWave, StuckOutput, UnexplainedPlace,
 };
-use noise_analysis::report::{ChannelReport, Finding, Report};
+use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, Report};
 
 /// Frequencies around a line, from this part of its own to the inverse.
 const AROUND: f64 = 0.5;
-/// Looks of the channels of one unit.
-const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
 const BARS: usize = 40;
 
 /// The picture of the finding at `index`, called `number`; `None` if the report has no data for it.
@@ -34,14 +33,14 @@ pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<P
         }
         Effect::LevelStep(LevelStep { time_s, .. }) | Effect::LevelChange(LevelChange { time_s, .. }) => {
             let at = time_s.value;
-            in_time(report, channel, finding, Some(TimePlace { label: span(at), from_s: at, to_s: at }))
+            in_time(report, channel, finding, Some(Place { label: span(at), from: at, to: at }))
         }
         Effect::NoisyInterval(NoisyInterval { from_s, to_s, .. })
         | Effect::StuckOutput(StuckOutput { from_s, to_s, .. })
         | Effect::MotionInterval(MotionInterval { from_s, to_s, .. }) => {
-            let (from_s, to_s) = (from_s.value, to_s.value);
-            let label = format!("{} … {}", span(from_s), span(to_s));
-            in_time(report, channel, finding, Some(TimePlace { label, from_s, to_s }))
+            let (from, to) = (from_s.value, to_s.value);
+            let label = format!("{} … {}", span(from), span(to));
+            in_time(report, channel, finding, Some(Place { label, from, to }))
         }
         Effect::ShotNoise(_)
         | Effect::LinearDrift(_)
@@ -64,7 +63,7 @@ pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<P
             UnexplainedPlace::Frequency(frequency_hz) => line_in_spectrum(report, channel, frequency_hz.value),
             // A line of the curve alone is not in the spectrum.
             UnexplainedPlace::AveragingTime(_) | UnexplainedPlace::LineOfCurve { .. } => {
-                Some(residual(report, channel))
+                Some(allan_deviation_plot(report, channel))
             }
         },
         Effect::MarkovProcess(_)
@@ -75,7 +74,7 @@ pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<P
         | Effect::Spikes(_)
         | Effect::Saturation(_)
         | Effect::DroppedSamples(_)
-        | Effect::RepeatedSamples(_) => Some(residual(report, channel)),
+        | Effect::RepeatedSamples(_) => Some(allan_deviation_plot(report, channel)),
     }?;
     let title = format!("Evidence {number}: {} in {}", words(finding.effect.name()), channel_list(&finding.channels));
     Some(Plot { id: format!("finding-{number}"), title, ..plot })
@@ -99,37 +98,28 @@ fn line_in_spectrum(report: &Report, channel: &ChannelReport, frequency: f64) ->
     if lines.iter().all(|line| line.points.len() < 2) {
         return None;
     }
-    let [frame] = frames([220.0]);
-    let across = Axis::logarithmic("frequency, Hz", lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let up = Axis::logarithmic(&panel.up.label, lines.iter().flat_map(heights), frame);
-    let place = Place { label: quantity_digits(frequency, "Hz", 3), from: frequency, to: frequency };
-    Some(Plot {
-        description: format!(
-            "The spectrum of {} around {}.",
-            channel_name(channel),
-            quantity_digits(frequency, "Hz", 3)
-        ),
-        panels: vec![Panel { places: vec![place], ..Panel::new(across, up, lines) }],
-        ..whole
-    })
+    let place = Place::at_frequency(frequency);
+    let description = format!("The spectrum of {} around {}.", channel_name(channel), place.label);
+    let panel = Panel::logarithmic("frequency, Hz", &panel.up.label, lines, frames([220.0])[0]);
+    Some(untitled(description, panel.with_places(vec![place])))
 }
 
-/// s from the first sample.
-struct TimePlace {
-    label: String,
-    from_s: f64,
-    to_s: f64,
+fn untitled(description: String, panel: Panel) -> Plot {
+    Plot::new("", "", description, [panel])
 }
 
-fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Option<TimePlace>) -> Option<Plot> {
+fn bias_label(channel: &ChannelReport) -> String {
+    format!("bias, {}", unit(&channel.unit))
+}
+
+/// `place` is in s from the first sample.
+fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, place: Option<Place>) -> Option<Plot> {
     let same_unit =
         report.channels.iter().filter(|other| other.unit == channel.unit && finding.channels.contains(&other.name));
-    let mut length = 0.0_f64;
-    let series: Vec<(&ChannelReport, &noise_analysis::report::BiasOverTime)> = same_unit
-        .filter_map(|other| Some((other, other.figure_data.bias_over_time.as_ref()?)))
-        .inspect(|(_, bias)| length = length.max(bias.time_s.last().copied().unwrap_or(0.0)))
-        .collect();
-    let (scale, per) = time_unit(length);
+    let series: Vec<(&ChannelReport, &BiasOverTime)> =
+        same_unit.filter_map(|other| Some((other, other.figure_data.bias_over_time.as_ref()?))).collect();
+    let ends = series.iter().filter_map(|(_, bias)| bias.time_s.last());
+    let (scale, per) = time_unit(ends.copied().fold(0.0, f64::max));
     let lines: Vec<Line> = series
         .iter()
         .zip(LOOKS.into_iter().cycle())
@@ -138,20 +128,11 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Opti
             Line::new(channel_name(other), look, points)
         })
         .collect();
-    let first = lines.first()?;
-    let across = Axis::linear(&format!("time, {per}"), places(first).into_iter(), [LEFT, RIGHT]);
-    let [frame] = frames([200.0]);
-    let up = Axis::linear(&format!("bias, {}", unit(&channel.unit)), lines.iter().flat_map(heights), frame);
-    let place = at.map(|TimePlace { label, from_s, to_s }| Place { label, from: from_s / scale, to: to_s / scale });
-    Some(Plot {
-        id: String::new(),
-        title: String::new(),
-        description: place.as_ref().map_or_else(
-            || "The bias over time.".to_owned(),
-            |place| format!("The bias over time, with the place at {}.", place.label),
-        ),
-        panels: vec![Panel { places: place.into_iter().collect(), ..Panel::new(across, up, lines) }],
-    })
+    lines.first()?;
+    let place = place.map(|Place { label, from, to }| Place { label, from: from / scale, to: to / scale });
+    let at = place.as_ref().map_or_else(String::new, |place| format!(", with the place at {}", place.label));
+    let panel = Panel::linear(&format!("time, {per}"), &bias_label(channel), lines, frames([200.0])[0]);
+    Some(untitled(format!("The bias over time{at}."), panel.with_places(place.into_iter().collect())))
 }
 
 struct Covariate<'a> {
@@ -177,12 +158,10 @@ fn beside(report: &Report, clearest: &ChannelReport, index: usize, covariate: &C
             bias.time_s.iter().enumerate().filter_map(|(index, time)| Some((index, at(time)?))).collect();
         let own = shown.iter().find(|shown| shown.channel == channel.name);
         let own = own.and_then(|shown| shown.effect.parameters().remove(covariate.sensitivity));
-        let name = own.map_or_else(
-            || channel_name(channel),
-            |own| format!("{} {}", channel_name(channel), bounded_quantity(&own)),
-        );
+        let own = own.map_or_else(String::new, |own| format!(" {}", bounded_quantity(&own)));
+        let name = format!("{}{own}", channel_name(channel));
         let measured = pairs.iter().map(|&(index, x)| (x, bias.mean[index])).collect();
-        lines.push(Line::new(name, look, measured).with_dots().unjoined());
+        lines.push(Line::new(name, look, measured).dotted());
         if bias.followed.len() == bias.mean.len() {
             followed.extend(pairs.iter().map(|&(index, x)| (x, bias.followed[index])));
         }
@@ -192,25 +171,18 @@ fn beside(report: &Report, clearest: &ChannelReport, index: usize, covariate: &C
     }
     if !followed.is_empty() {
         followed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        lines.push(Line::new("what the findings explain", Look::Followed, followed).with_dots().unjoined());
+        lines.push(Line::new("what the findings explain", Look::Followed, followed).dotted());
     }
     let name = if covariate.name == "temp" { "temperature".to_owned() } else { channel_name(other) };
-    let [frame] = frames([240.0]);
     let label = format!("{name} less its mean, {}", unit(&other.unit));
-    let across = Axis::linear(&label, lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let frame = below_legend(frame, &lines);
-    let up = Axis::linear(&format!("bias, {}", unit(&clearest.unit)), lines.iter().flat_map(heights), frame);
-    Some(Plot {
-        id: String::new(),
-        title: String::new(),
-        description: format!("The bias over the {name}, in means of {}.", span(along.block_s)),
-        panels: vec![Panel::new(across, up, lines)],
-    })
+    let frame = below_legend(frames([240.0])[0], &lines);
+    let description = format!("The bias over the {name}, in means of {}.", span(along.block_s));
+    Some(untitled(description, Panel::linear(&label, &bias_label(clearest), lines, frame)))
 }
 
 fn histogram(channel: &ChannelReport) -> Option<Plot> {
     let bias = channel.figure_data.bias_over_time.as_ref()?;
-    let (low, high) = bias.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &of| (a.min(of), b.max(of)));
+    let (low, high) = extremes(bias.mean.iter().copied());
     let width = (high - low) / BARS as f64;
     if width <= 0.0 || !width.is_finite() {
         return None;
@@ -219,24 +191,10 @@ fn histogram(channel: &ChannelReport) -> Option<Plot> {
     for value in &bias.mean {
         counts[(((value - low) / width) as usize).min(BARS - 1)] += 1.0;
     }
-    let outline: Vec<(f64, f64)> = counts
-        .iter()
-        .enumerate()
-        .flat_map(|(bar, &count)| [(low + bar as f64 * width, count), (low + (bar + 1) as f64 * width, count)])
-        .collect();
-    let lines = vec![Line::new(format!("blocks of {}", span(bias.block_s)), Look::Measured, outline)];
-    let [frame] = frames([200.0]);
-    let label = format!("bias, {}", unit(&channel.unit));
-    let across = Axis::linear(&label, lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let up = Axis::linear("blocks", lines.iter().flat_map(heights).chain([0.0]), frame);
-    Some(Plot {
-        id: String::new(),
-        title: String::new(),
-        description: format!("How often each mean of {} occurs.", span(bias.block_s)),
-        panels: vec![Panel::new(across, up, lines)],
-    })
-}
-
-fn residual(report: &Report, channel: &ChannelReport) -> Plot {
-    allan_deviation_plot(report, channel)
+    let top = |(bar, &count): (usize, &f64)| [bar, bar + 1].map(|edge| (low + edge as f64 * width, count));
+    let outline = counts.iter().enumerate().flat_map(top).collect();
+    let line = Line::new(format!("blocks of {}", span(bias.block_s)), Look::Measured, outline);
+    let up = Axis::linear("blocks", heights(&line).into_iter().chain([0.0]), frames([200.0])[0]);
+    let panel = Panel::linear(&bias_label(channel), "", vec![line], frames([200.0])[0]);
+    Some(untitled(format!("How often each mean of {} occurs.", span(bias.block_s)), Panel { up, ..panel }))
 }

@@ -1,9 +1,8 @@
 //! A figure: panels with axes, lines, bands and markers, as SVG, with its values for the page's script.
 
-use super::axis::{Axis, Tick, has_logarithm};
-use crate::rounding::significant;
+use super::axis::{Axis, Tick};
+use crate::rounding::{quantity_digits, significant};
 use maud::{Markup, html};
-use std::fmt::Write;
 
 /// Width of every figure, pixels.
 pub(super) const WIDTH: f64 = 760.0;
@@ -18,7 +17,7 @@ const BELOW: f64 = 48.0;
 /// Space above the first panel for a tick's label.
 const ABOVE: f64 = 10.0;
 
-/// How the style sheet draws a line.
+/// How the style sheet draws a line, in the order of its colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Look {
     Measured,
@@ -35,16 +34,7 @@ pub(super) enum Look {
 
 impl Look {
     pub(super) fn class(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::SecondAxis => "second",
-            Self::ThirdAxis => "third",
-            Self::Model => "model",
-            Self::Before => "before",
-            Self::Term => "term",
-            Self::Reference => "reference",
-            Self::Followed => "followed",
-        }
+        super::COLOURS[self as usize].0
     }
 }
 
@@ -67,49 +57,34 @@ pub(super) struct Line {
 
 impl Line {
     pub(super) fn new(name: impl Into<String>, look: Look, points: Vec<(f64, f64)>) -> Self {
-        let name = name.into();
-        let (bounds, mark) = (Vec::new(), String::new());
-        Self {
-            name,
-            look,
-            points,
-            bounds,
-            has_dots: false,
-            is_joined: true,
-            in_legend: true,
-            mark,
-            mark_is_right: false,
-        }
+        let (name, bounds, mark) = (name.into(), Vec::new(), String::new());
+        let (has_dots, is_joined, in_legend, mark_is_right) = (false, true, true, false);
+        Self { name, look, points, bounds, has_dots, is_joined, in_legend, mark, mark_is_right }
     }
 
-    pub(super) fn with_bounds(mut self, bounds: Vec<(f64, f64)>) -> Self {
-        self.bounds = bounds;
-        self
+    pub(super) fn with_bounds(self, bounds: Vec<(f64, f64)>) -> Self {
+        Self { bounds, ..self }
     }
 
-    pub(super) fn with_dots(mut self) -> Self {
-        self.has_dots = true;
-        self
+    /// Dots without a line between them.
+    pub(super) fn dotted(self) -> Self {
+        Self { is_joined: false, ..self.with_dots() }
     }
 
-    pub(super) fn unjoined(mut self) -> Self {
-        self.is_joined = false;
-        self
+    pub(super) fn with_dots(self) -> Self {
+        Self { has_dots: true, ..self }
     }
 
-    pub(super) fn unlisted(mut self) -> Self {
-        self.in_legend = false;
-        self
+    pub(super) fn unlisted(self) -> Self {
+        Self { in_legend: false, ..self }
     }
 
-    pub(super) fn marked(mut self, mark: impl Into<String>) -> Self {
-        self.mark = mark.into();
-        self
+    pub(super) fn marked(self, mark: impl Into<String>) -> Self {
+        Self { mark: mark.into(), ..self }
     }
 
-    pub(super) fn marked_right(mut self, mark: impl Into<String>) -> Self {
-        self.mark_is_right = true;
-        self.marked(mark)
+    pub(super) fn marked_right(self, mark: impl Into<String>) -> Self {
+        Self { mark_is_right: true, ..self.marked(mark) }
     }
 }
 
@@ -136,6 +111,23 @@ pub(crate) struct Plot {
     /// Alternative text with numbers.
     pub description: String,
     pub(super) panels: Vec<Panel>,
+}
+
+impl Place {
+    pub(super) fn at_frequency(hz: f64) -> Self {
+        Self { label: quantity_digits(hz, "Hz", 3), from: hz, to: hz }
+    }
+}
+
+impl Plot {
+    pub(super) fn new<const PANELS: usize>(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        description: impl Into<String>,
+        panels: [Panel; PANELS],
+    ) -> Self {
+        Self { id: id.into(), title: title.into(), description: description.into(), panels: panels.into() }
+    }
 }
 
 /// Top and bottom of each panel.
@@ -214,16 +206,10 @@ impl Plot {
 
     /// Label of the upward axis, swatches and names, for the page.
     pub(crate) fn key(&self) -> Markup {
-        let mut lines: Vec<&Line> = Vec::new();
-        for line in self.panels.iter().flat_map(|panel| &panel.lines).filter(|line| line.in_legend) {
-            if lines.iter().all(|known| known.name != line.name) {
-                lines.push(line);
-            }
-        }
         html! {
             ul.key {
                 @if let Some(first) = self.panels.first() { li.up { (first.up.title()) } }
-                @for line in lines {
+                @for (.., line) in self.legend_places() {
                     li {
                         svg viewBox="0 0 22 10" aria-hidden="true" {
                             g class=(line.look.class()) {
@@ -238,11 +224,14 @@ impl Plot {
         }
     }
 
+    fn legend_places(&self) -> Vec<(f64, f64, &Line)> {
+        legend_places(self.panels.iter().flat_map(|panel| &panel.lines), (self.top() - TOP) / LEGEND_ROW)
+    }
+
     fn legend(&self) -> Markup {
-        let entries = legend_places(self.panels.iter().flat_map(|panel| &panel.lines), (self.top() - TOP) / LEGEND_ROW);
         html! {
             g class="legend" {
-                @for (row, left, line) in entries {
+                @for (row, left, line) in self.legend_places() {
                     @let middle = 16.0 + LEGEND_ROW * row;
                     g class=(line.look.class()) {
                         @if line.is_joined { line x1=(pixel(left)) x2=(pixel(left + 20.0)) y1=(pixel(middle)) y2=(pixel(middle)) {} }
@@ -264,6 +253,22 @@ impl Plot {
 impl Panel {
     pub(super) fn new(across: Axis, up: Axis, lines: Vec<Line>) -> Self {
         Self { across, up, lines, places: Vec::new() }
+    }
+
+    /// With logarithmic axes around all `lines`.
+    pub(super) fn logarithmic(across: &str, up: &str, lines: Vec<Line>, frame: [f64; 2]) -> Self {
+        let across = Axis::logarithmic(across, lines.iter().flat_map(places), [LEFT, RIGHT]);
+        Self::new(across, Axis::logarithmic(up, lines.iter().flat_map(heights), frame), lines)
+    }
+
+    /// With linear axes around all `lines`.
+    pub(super) fn linear(across: &str, up: &str, lines: Vec<Line>, frame: [f64; 2]) -> Self {
+        let across = Axis::linear(across, lines.iter().flat_map(places), [LEFT, RIGHT]);
+        Self::new(across, Axis::linear(up, lines.iter().flat_map(heights), frame), lines)
+    }
+
+    pub(super) fn with_places(self, places: Vec<Place>) -> Self {
+        Self { places, ..self }
     }
 
     fn svg(&self, id: &str, is_last: bool) -> Markup {
@@ -399,66 +404,32 @@ impl Panel {
 
     fn values(&self) -> String {
         // Equal places are not repeated.
-        let places = |line: &Line| numbers(line.points.iter().map(|of| of.0));
+        let first = |pairs: &[(f64, f64)]| numbers(pairs.iter().map(|of| of.0));
+        let second = |pairs: &[(f64, f64)]| numbers(pairs.iter().map(|of| of.1));
         let before = [None].into_iter().chain(self.lines.iter().map(Some));
         let lines: Vec<String> = self
             .lines
             .iter()
             .zip(before)
             .map(|(line, before)| {
-                let is_same = before.is_some_and(|before| {
-                    before.points.len() == line.points.len()
-                        && before.points.iter().zip(&line.points).all(|(a, b)| a.0 == b.0)
-                });
-                let x = if is_same { "null".to_owned() } else { places(line) };
-                let bounds = if line.bounds.is_empty() {
-                    String::new()
-                } else {
-                    format!(
-                        ",\"low\":{},\"high\":{}",
-                        numbers(line.bounds.iter().map(|of| of.0)),
-                        numbers(line.bounds.iter().map(|of| of.1))
-                    )
+                let is_same = before.is_some_and(|before| places(before) == places(line));
+                let x = if is_same { "null".to_owned() } else { first(&line.points) };
+                let bounds = match line.bounds.is_empty() {
+                    true => String::new(),
+                    false => format!(r#","low":{},"high":{}"#, first(&line.bounds), second(&line.bounds)),
                 };
-                format!(
-                    "{{\"name\":{},\"x\":{},\"y\":{}{bounds}}}",
-                    quoted(&line.name),
-                    x,
-                    numbers(line.points.iter().map(|of| of.1))
-                )
+                format!(r#"{{"name":{},"x":{x},"y":{}{bounds}}}"#, quoted(&line.name), second(&line.points))
             })
             .collect();
-        format!("{{\"x\":{},\"y\":{},\"lines\":[{}]}}", self.across.json(), self.up.json(), lines.join(","))
+        format!(r#"{{"x":{},"y":{},"lines":[{}]}}"#, self.across.json(), self.up.json(), lines.join(","))
     }
 }
 
 impl Axis {
-    /// The pixel of `value`, up to one axis length outside.
-    fn unclipped(&self, value: f64) -> Option<f64> {
-        if self.is_logarithmic && !has_logarithm(value) {
-            return None;
-        }
-        let reach = (self.end - self.start).abs();
-        let part = if self.is_logarithmic {
-            (value / self.from).ln() / (self.to / self.from).ln()
-        } else {
-            (value - self.from) / (self.to - self.from)
-        };
-        let pixel = self.start + part * (self.end - self.start);
-        let (low, high) = (self.start.min(self.end) - reach, self.start.max(self.end) + reach);
-        part.is_finite().then(|| pixel.clamp(low, high))
-    }
-
     fn json(&self) -> String {
-        format!(
-            "{{\"label\":{},\"log\":{},\"from\":{:e},\"to\":{:e},\"start\":{},\"end\":{}}}",
-            quoted(&self.label),
-            self.is_logarithmic,
-            self.from,
-            self.to,
-            self.start,
-            self.end
-        )
+        let Self { label, is_logarithmic, from, to, start, end } = self;
+        let label = quoted(label);
+        format!(r#"{{"label":{label},"log":{is_logarithmic},"from":{from:e},"to":{to:e},"start":{start},"end":{end}}}"#)
     }
 }
 
@@ -498,23 +469,12 @@ fn numbers(values: impl Iterator<Item = f64>) -> String {
 
 /// JSON that is safe inside an HTML element.
 fn quoted(text: &str) -> String {
-    let mut out = String::from("\"");
-    for letter in text.chars() {
-        match letter {
-            '"' | '\\' => {
-                out.push('\\');
-                out.push(letter);
-            }
-            '<' | '>' | '&' => {
-                let _ = write!(out, "\\u{:04x}", u32::from(letter));
-            }
-            letter if u32::from(letter) < 32 => out.push(' '),
-            letter => out.push(letter),
-        }
-    }
-    out.push('"');
-    out
+    let json = serde_json::to_string(text).unwrap_or_default();
+    [('<', "\\u003c"), ('>', "\\u003e"), ('&', "\\u0026")]
+        .iter()
+        .fold(json, |json, (sign, code)| json.replace(*sign, code))
 }
+
 pub(super) fn places(line: &Line) -> Vec<f64> {
     line.points.iter().map(|point| point.0).collect()
 }

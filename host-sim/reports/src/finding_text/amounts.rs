@@ -51,37 +51,36 @@ impl Amounts<'_> {
     }
 
     /// `0.27 °/s` of one channel, `x 21.2, y 11.9, z −27.8 m°/s/°C` of several.
-    pub(super) fn each(&self, name: &'static str) -> String {
-        self.written(self.parameters(name))
+    pub(super) fn each(&self, name: &str) -> String {
+        self.each_as(name, None, 1.0)
     }
 
-    /// Times a positive `factor`.
-    pub(super) fn each_scaled(&self, name: &'static str, factor: f64) -> String {
-        self.written(self.parameters(name).map(|of| OfChannel { parameter: scaled(of.parameter, factor), ..of }))
+    /// Times a positive `factor`, perhaps in another unit.
+    pub(super) fn each_as(&self, name: &str, unit: Option<&str>, factor: f64) -> String {
+        let converted = self.parameters(name).map(|of| {
+            let parameter = scaled(of.parameter, factor);
+            let unit = unit.map_or(parameter.unit, str::to_owned);
+            OfChannel { parameter: Parameter { unit, ..parameter }, ..of }
+        });
+        let each: Vec<OfChannel<'_>> = converted.collect();
+        match &each[..] {
+            [one] if self.label == Label::Nothing => self.one(&one.parameter),
+            each => self.list(each),
+        }
     }
 
-    /// In another unit.
-    pub(super) fn each_as(&self, name: &'static str, unit: &str, factor: f64) -> String {
-        let converted = |of: Parameter| Parameter { unit: unit.to_owned(), ..scaled(of, factor) };
-        self.written(self.parameters(name).map(|of| OfChannel { parameter: converted(of.parameter), ..of }))
-    }
-
-    pub(super) fn values(&self, name: &'static str) -> Vec<f64> {
-        self.parameters(name).map(|of| of.parameter.value).collect()
-    }
-
-    pub(super) fn largest(&self, name: &'static str, least: f64) -> f64 {
-        self.values(name).into_iter().fold(least, f64::max)
+    pub(super) fn largest(&self, name: &str, least: f64) -> f64 {
+        self.parameters(name).map(|of| of.parameter.value).fold(least, f64::max)
     }
 
     /// Channels in which the parameter may be 0 or of either sign.
-    pub(super) fn with_bound_alone(&self, name: &'static str) -> Vec<String> {
+    pub(super) fn with_bound_alone(&self, name: &str) -> Vec<String> {
         let is_bound = |of: &OfChannel| of.parameter.low <= 0.0 && of.parameter.high >= 0.0;
         self.parameters(name).filter(is_bound).map(|of| of.channel.to_owned()).collect()
     }
 
     /// A line with a width in some channels has an amplitude in the others: √2 times the deviation.
-    fn parameters(&self, name: &'static str) -> impl Iterator<Item = OfChannel<'_>> {
+    fn parameters(&self, name: &str) -> impl Iterator<Item = OfChannel<'_>> {
         self.shown.iter().filter_map(move |&ShownEffect { channel, effect }| {
             let mut parameters = effect.parameters();
             let parameter = match (parameters.remove(name), name) {
@@ -90,14 +89,6 @@ impl Amounts<'_> {
             };
             Some(OfChannel { channel, parameter })
         })
-    }
-
-    fn written<'a>(&self, each: impl Iterator<Item = OfChannel<'a>>) -> String {
-        let each: Vec<OfChannel> = each.collect();
-        match &each[..] {
-            [one] if self.label == Label::Nothing => self.one(&one.parameter),
-            each => self.list(each),
-        }
     }
 
     /// One prefix per unit, the unit behind the last number, the sensor before the first; equal numbers once.
@@ -112,7 +103,7 @@ impl Amounts<'_> {
         }
         let name = |position: usize, channel: &str| match channel.trim_start_matches(sensor(channel)) {
             axis if (position > 0 || self.label == Label::Axis) && !axis.is_empty() => axis.to_owned(),
-            _ => channel_list(&[channel.to_owned()]),
+            _ => channel_list([channel]),
         };
         let text = |(group, Group { numbers, unit }): (&&[OfChannel], &Group)| {
             let named = group.iter().zip(numbers).enumerate();

@@ -5,7 +5,7 @@ use noise_analysis::report::ChannelReport;
 
 /// Such as `accel x`.
 pub(crate) fn channel_name(channel: &ChannelReport) -> String {
-    channel_list(std::slice::from_ref(&channel.name))
+    channel_list([&channel.name])
 }
 
 /// Prefixes of gyros, accelerometers and magnetometers; the others are conditions.
@@ -16,7 +16,12 @@ pub(crate) const ALL_CHANNELS: &str = "all channels";
 
 /// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
 #[must_use]
-pub fn channel_list(names: &[String]) -> String {
+pub fn channel_list<N: AsRef<str>>(names: impl IntoIterator<Item = N>) -> String {
+    let names: Vec<N> = names.into_iter().collect();
+    list(&names.iter().map(AsRef::as_ref).collect::<Vec<&str>>())
+}
+
+fn list(names: &[&str]) -> String {
     let axes = |prefix: &str| -> Vec<&str> { names.iter().filter_map(|name| name.strip_prefix(prefix)).collect() };
     let (gyros, accelerometers, magnetometers) = (axes("gyro_"), axes("accl_"), axes("magn_"));
     if gyros.len() == 3 && accelerometers.len() == 3 {

@@ -1,5 +1,6 @@
 //! The tables of the page.
 
+use crate::coefficients::LETTERS;
 use crate::curve_numbers::curve_numbers;
 use crate::formatting::{duration, number, optional, parameter_name, percent, words};
 use crate::rounding::{NONE, Scale, parameter_magnitude};
@@ -46,7 +47,7 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
 pub(super) fn coefficients(groups: &[CoefficientTable], has_sections: bool) -> Markup {
     // An accelerometer's random walks have other names.
     let headings = |group: &CoefficientTable| {
-        let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
+        let columns = group.names.iter().zip(LETTERS).zip(&group.units);
         let columns = columns.map(|((name, letter), unit)| {
             (html! { span.letter { (letter) } ", " (unit) " " span.under { (name) } }, true)
         });

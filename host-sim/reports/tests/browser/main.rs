@@ -83,7 +83,7 @@ fn report() -> Report {
 
 fn facts(program: &str, report: &Report, is_dark: bool, widths: &[u32]) -> Vec<Value> {
     let dir = tempfile::tempdir().expect("a folder");
-    let page = reports::page::html(report, Some("fan.csv"));
+    let page = reports::page::html(report, Some("fan.csv"), None);
     assert!(page.len() < 1_000_000, "{} bytes", page.len());
     let escaped = page.replace('&', "&amp;").replace('"', "&quot;");
     let frame =
@@ -237,7 +237,7 @@ fn the_page_of_an_hour_of_twelve_channels_is_below_700_kilobytes() {
         data.bias_over_time = Some(BiasOverTime { block_s: 15.012345, followed, time_s, mean });
     }
     assert_eq!(report.channels.len(), 12);
-    let bytes = reports::page::html(&report, None).len();
+    let bytes = reports::page::html(&report, None, None).len();
     assert!(bytes < 700_000, "{bytes} bytes");
 }
 

@@ -1,11 +1,13 @@
 //! Each channel of a finding has its own number.
 
 use crate::fixture;
+use allan_core::NoiseTerm;
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
 use noise_analysis::effects::*;
 use noise_analysis::report::{BiasOverTime, ChannelEffect, ChannelReport, Finding, Report, Validation};
 use reports::json::ReportJson;
 use reports::rounding::significant;
+use reports::rows::ReportRow;
 use std::collections::BTreeMap;
 
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
@@ -112,7 +114,7 @@ fn every_channel_of_a_finding_has_its_own_number_and_sign() {
     for (kind, sizes) in all.chain(other_kinds().into_iter().map(|kind| (kind, positive))) {
         let report = report(kind, sizes, Validation::Yes);
         let text = &reports::summary::findings(&report).0[0];
-        let page = reports::page::html(&report, None);
+        let page = reports::page::html(&report, None, None);
         for (sentence, digits) in [(&text.physics, 3), (&text.brief, 2)] {
             for (axis, size) in ["x", "y", "z"].into_iter().zip(sizes) {
                 let number = significant(size, digits);
@@ -124,7 +126,7 @@ fn every_channel_of_a_finding_has_its_own_number_and_sign() {
             }
         }
         assert!(page.contains(&text.physics), "{}", text.physics);
-        let json = serde_json::to_value(ReportJson::from(&report)).expect("a report");
+        let json = serde_json::to_value(ReportJson::new(&report, None)).expect("a report");
         for (channel, shown) in GYROS.iter().zip(&report.channels) {
             let own = serde_json::to_value(shown.effects[0].effect.parameters()).expect("parameters");
             assert_eq!(json["findings"][0]["in_channels"][channel], own);
@@ -180,11 +182,22 @@ fn the_picture_of_a_sensitivity_has_a_line_for_every_channel() {
     let mut temperature: ChannelReport = fixture::channel("temp", "degC");
     temperature.figure_data.bias_over_time = course(1e3);
     report.channels.push(temperature);
-    let page = reports::page::html(&report, None);
+    let page = reports::page::html(&report, None, None);
     let figure =
         page.split("id=\"finding-1\"").nth(1).and_then(|rest| rest.split("</figure>").next()).expect("a figure");
     for (name, size) in ["gyro x", "gyro y", "gyro z"].into_iter().zip(SIZES) {
         let label = format!("{name} {}", significant(size, 3));
         assert!(figure.contains(&label), "{label}: {figure}");
     }
+}
+
+/// A ramp, whose coefficient is called slope, too.
+#[test]
+fn every_coefficient_of_a_channel_has_a_row() {
+    let mut report = fixture::report();
+    report.channels[0].refitted.terms.push(fixture::term(NoiseTerm::RateRamp, 1e-6, "deg/s"));
+    let rows = reports::rows::rows(&report, "a.csv", None);
+    let is_own = |row: &&ReportRow| row.row == "coefficient" && row.channel.as_deref() == Some("gyro_x");
+    let kinds: Vec<&str> = rows.iter().filter(is_own).filter_map(|row| row.kind.as_deref()).collect();
+    assert_eq!(kinds, ["angle_random_walk", "bias_instability", "rate_random_walk", "rate_ramp"]);
 }

@@ -188,7 +188,7 @@ fn every_report_tells_how_the_noise_changes() {
     let mut out = Vec::new();
     reports::full_tables::write(&report, None, &mut out).expect("a vector can be written");
     let full = String::from_utf8(out).expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
-    let page = reports::page::html(&report, None);
+    let page = reports::page::html(&report, None, None);
     for told in [
         "fitted to the later quarter",
         "with the line where accel x has it in the second half, the model leaves 3.9; this uses the second half of accel x",

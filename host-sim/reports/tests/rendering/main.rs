@@ -14,7 +14,7 @@ fn text(report: &Report) -> String {
 }
 
 fn html(report: &Report) -> String {
-    page::html(report, Some("fan <1>.csv"))
+    page::html(report, Some("fan <1>.csv"), None)
 }
 
 fn svg(channel: &ChannelReport) -> String {

@@ -7,7 +7,9 @@ use noise_analysis::effects::{
     OutputFilter, SinusoidalLine, Unexplained, UnexplainedPlace,
 };
 use noise_analysis::report::assessment::{Innovations, RecordLength};
-use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, PartNote, Report, Stretch, Validation};
+use noise_analysis::report::{
+    BiasOverTime, ChannelReport, Finding, ModelErrorReport, PartNote, Report, Stretch, Validation,
+};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -252,22 +254,47 @@ fn the_error_on_the_unseen_half_is_told_in_percent_of_sigma() {
     }
     report.channels[1].after.unseen.rms_percent = Some(2.956);
     let sentence = "On the second half, which the model had not seen, σ is off by 3.0 to 10 % (the two halves differ by 5.0 %); without \
-                    what was found, by 100 %.";
+                    what was found in gyro z, by 100 %.";
     let sentences = reports::summary::record_sentences(&report);
     assert!(sentences.iter().any(|told| told == sentence), "{sentences:#?}");
     let tables = reports::summary::coefficient_tables(&report);
-    assert_eq!(tables[0].rows[0].error, "100 → 10 %");
+    assert_eq!(tables[0].rows[2].error, "100 → 10 %");
     // exp(6.4) is 600.
-    report.channels[0].after.unseen.rms_percent = Some(640.0);
-    report.channels[0].before.unseen.rms_percent = Some(700.0);
-    assert_eq!(reports::summary::coefficient_tables(&report)[0].rows[0].error, "> 1,000 %");
+    report.channels[2].after.unseen.rms_percent = Some(640.0);
+    report.channels[2].before.unseen.rms_percent = Some(700.0);
+    assert_eq!(reports::summary::coefficient_tables(&report)[0].rows[2].error, "> 1,000 %");
+}
+
+/// The first half alone has shown an effect that the whole record does not have.
+#[test]
+fn a_channel_without_a_finding_has_one_error() {
+    let mut report = report();
+    report.findings.clear();
+    for channel in &mut report.channels {
+        channel.effects.clear();
+        channel.before.unseen = ModelErrorReport { rms_percent: Some(14.842), ..channel.after.unseen.clone() };
+        channel.before.unseen.deviance_per_point = Some(40.0);
+        channel.after.unseen.rms_percent = Some(6.109);
+    }
+    let mut full = Vec::new();
+    reports::full_tables::write(&report, None, &mut full).expect("a vector can be written");
+    let page = reports::page::html(&report, None, None);
+    for text in [plain(&report, 120).join(" "), String::from_utf8(full).expect("text"), page.replace('\u{a0}', " ")] {
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains("σ is off by 6.3 %"), "{text}");
+        assert!(
+            !["without what was found", "with what was found (", "→ 6.3"].iter().any(|told| text.contains(told)),
+            "{text}"
+        );
+    }
+    assert_eq!(reports::summary::coefficient_tables(&report)[0].rows[0].error, "6.3 %");
 }
 
 #[test]
 fn the_errors_without_spikes_and_knocks_are_told_beside_those_as_recorded() {
     let mut report = report();
     assert!(reports::summary::record_sentences(&report).iter().all(|sentence| !sentence.contains("spikes")));
-    let channel = &mut report.channels[0];
+    let channel = &mut report.channels[2];
     for (model, [recorded, excluding]) in
         [(&mut channel.before, [69.315, 40.547]), (&mut channel.after, [9.531, 2.956])]
     {
@@ -280,14 +307,14 @@ fn the_errors_without_spikes_and_knocks_are_told_beside_those_as_recorded() {
         model.unseen_excluding = Some(error);
     }
     let sentences = reports::summary::record_sentences(&report);
-    let told = "Without spikes and knocks σ is off by: gyro x 50 → 3.0 %.";
+    let told = "Without spikes and knocks σ is off by: gyro z 50 → 3.0 %.";
     assert!(sentences.iter().any(|sentence| sentence == told), "{sentences:#?}");
     let sentences = reports::summary::record_sentences_in_short(&report);
     assert!(sentences.iter().all(|sentence| !sentence.contains("spikes")), "{sentences:#?}");
     // Spikes and knocks alone are no sign of other noise.
-    report.channels[0].after.unseen.deviance_per_point = Some(193.0);
+    report.channels[2].after.unseen.deviance_per_point = Some(193.0);
     let answer = reports::summary::record_sentences(&report).remove(0);
-    assert!(answer.contains(": spikes or knocks came oftener or larger than before in gyro x; "), "{answer}");
+    assert!(answer.contains(": spikes or knocks came oftener or larger than before in gyro z; "), "{answer}");
 }
 
 #[test]
@@ -331,7 +358,7 @@ fn what_the_record_does_not_tell_of_the_part_is_told_in_sentences() {
     let last = [
         "Without time stamps the sample rate is the stated 100 Hz; by the part's nominal clock of 819.2 Hz it would be \
          90.80 ± 0.10 Hz. Every τ and N scale with it.",
-        "The curves give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
+        "The spectra give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
          4 or 16 taps at another clock have the same length.",
         "Gyro z alone would have its filter read every 8.873 values, farther from the common figure than chance explains.",
         "The filter shows in 5 of the 6 channels whose noise is larger than a count.",

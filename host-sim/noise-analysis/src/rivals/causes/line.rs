@@ -2,7 +2,6 @@
 
 use super::grouping::join;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
-use crate::distributions::NORMAL_975;
 use crate::effects::{Effect, LineEvidence};
 use std::f64::consts::{PI, SQRT_2};
 
@@ -44,7 +43,7 @@ impl Line {
             evidence,
             frequency_hz,
             frequency: frequency_hz.value,
-            error: (frequency_hz.high - frequency_hz.low) / (2.0 * NORMAL_975),
+            error: frequency_hz.error(),
             amplitude,
             width,
         })
@@ -54,8 +53,7 @@ impl Line {
     /// record share: `√3/(πT)` times the relative error of the amplitude (D. Rife and R. Boorstyn, "Single-tone parameter
     /// estimation from discrete-time observations", IEEE Trans. Inf. Theory 20, 1974).
     pub(super) fn error_by_amplitude(&self, duration_s: f64) -> f64 {
-        let of = self.amplitude;
-        let relative = (of.high - of.low) / (2.0 * NORMAL_975 * of.value.max(f64::MIN_POSITIVE));
+        let relative = self.amplitude.error() / self.amplitude.value.max(f64::MIN_POSITIVE);
         (3f64.sqrt() / (PI * duration_s) * relative).min(self.error)
     }
 }

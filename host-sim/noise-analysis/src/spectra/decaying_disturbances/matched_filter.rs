@@ -2,7 +2,6 @@
 
 use crate::spectra::periodogram::{smooth_length, taper};
 use crate::spectra::slow_background::SlowBackground;
-use crate::spectra::whittle::SpectralBand;
 use fourier::Complex;
 use std::f64::consts::TAU;
 
@@ -10,8 +9,6 @@ use std::f64::consts::TAU;
 const MOST_EMPTY: f64 = 1.0 / 32.0;
 /// Lowest order that the filters pass, periods per record.
 const LOWEST: usize = 6;
-/// White noise, a random walk and ten Markov processes.
-const TERMS: usize = 12;
 /// Ordinate over the noise of a line (chance: 10⁻⁶), and ordinates on either side that its taper reaches.
 const LINE: f64 = 14.0;
 const LINE_REACH: usize = 2;
@@ -121,17 +118,8 @@ fn filled(means: &[f64]) -> Option<Vec<f64>> {
 
 /// 1/density at each order, up to a factor; 0 at lines and if unknown.
 fn weights(ordinates: &[f64]) -> Option<Vec<f64>> {
-    let mut bands: Vec<SpectralBand> = Vec::new();
-    let mut first = 1;
-    while first + 1 < ordinates.len() {
-        // A band is an eighth of its frequency wide.
-        let next = (first + first / 8 + 1).min(ordinates.len() - 1);
-        let count = (next - first) as f64;
-        let density = ordinates[first..next].iter().sum::<f64>() / count;
-        bands.push(SpectralBand { frequency: 0.5 * (first + next - 1) as f64, density, ordinates: count });
-        first = next;
-    }
-    let background = SlowBackground::<TERMS>::fit(&bands)?;
+    let last = ordinates.len().checked_sub(1)?;
+    let background = SlowBackground::fit(ordinates[..last].iter().copied().enumerate().skip(1))?;
     let noise: Vec<f64> = (0..ordinates.len()).map(|order| background.density(order as f64)).collect();
     let ratios: Vec<f64> = ordinates.iter().zip(&noise).map(|(ordinate, noise)| ordinate / noise).collect();
     let around = |at: usize, reach: usize| &ratios[at.saturating_sub(reach)..(at + reach + 1).min(ratios.len())];
