@@ -220,8 +220,9 @@ fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
     Ok(stream)
 }
 
-/// Replays a table of register counts or a frame log over the emulated bus, and analyses what the driver reads.
-pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
+/// Replays a table of register counts or a frame log over the emulated bus, and analyses what the driver reads; false if the
+/// file ends early.
+pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<(Report, bool)> {
     let ReplayArguments { file, rate, range, output: _ } = arguments;
     let input = RecordedInput::open(file)?;
     if !input.format().is_text() {
@@ -232,7 +233,10 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
     }
     let (recording, notes) = replayed(&input, (*range).into())?;
     note_all(&notes);
-    analyze_recording(recording, *rate).with_context(|| file.display().to_string())
+    note_all(recording.damage.as_slice());
+    let is_complete = recording.damage.is_none();
+    let report = analyze_recording(recording, *rate).with_context(|| file.display().to_string())?;
+    Ok((report, is_complete))
 }
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.

@@ -82,8 +82,9 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
             let ReplayArguments { file, output, .. } = &arguments;
             let files = OutputFiles::new([file.as_path()], output.force);
             output::check(&output.outputs, &files)?;
-            let report = analyze::analyze_replay(&arguments)?;
-            output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
+            let (report, is_complete) = analyze::analyze_replay(&arguments)?;
+            output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)?;
+            Incomplete::check(is_complete)
         }
         Command::Bench(arguments) => record::bench_device(&arguments),
         Command::Record { out, port, baud, seconds, output } => {

@@ -28,7 +28,11 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
 
 fn convert(arguments: &RecordingArguments, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<()> {
     match open_rows(arguments)? {
-        Recorded::Counts(recording) => recording_file::write(&recording, out, format, files),
+        Recorded::Counts(recording) => {
+            recording_file::write(&recording, out, format, files)?;
+            recording.damage.iter().for_each(|sentence| note(format_args!("{sentence}")));
+            Incomplete::check(recording.damage.is_none())
+        }
         Recorded::AnySensor(input, options) => {
             let (part, stated_hz) = (arguments.time_range(), arguments.rate);
             let written = write(&SensorRows { input: &input, options: *options, part, stated_hz }, out, format, files)?;

@@ -8,7 +8,6 @@ pub(crate) mod gzip_members;
 pub(crate) mod input_error;
 pub(crate) mod read_ahead;
 pub(crate) mod read_monitor;
-pub(crate) mod stream_error;
 pub(crate) mod threads;
 pub(crate) mod utf16_reader;
 pub(crate) mod zstd_frames;

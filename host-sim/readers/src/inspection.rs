@@ -3,7 +3,6 @@
 mod column_facts;
 mod sensor_guess;
 mod steady_part;
-mod time_unit;
 mod unit_guess;
 
 use crate::columns::column_selection::ColumnSelection;

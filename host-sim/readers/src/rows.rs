@@ -1,6 +1,5 @@
 //! Rows, batches, and whole columns.
 
-pub(crate) mod any_sensor;
 pub(crate) mod batch;
 pub(crate) mod padding;
 pub(crate) mod quantizer;

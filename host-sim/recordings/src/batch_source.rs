@@ -1,6 +1,6 @@
 //! Batches of a file or of memory, with the verdicts of the burst validator.
 
-use crate::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, TimeStamp, Verdict};
+use crate::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, Verdict};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use measurement::adis16405;
 use readers::{
@@ -136,24 +136,26 @@ impl<'a> RecordedRows<'a> {
         }
     }
 
-    pub(crate) fn inside(&self, part: TimeRange, stated_hz: Option<f64>) -> Result<Vec<bool>, TimeBaseError> {
+    /// Positions of the samples in a part.
+    pub(crate) fn inside(&self, part: TimeRange, stated_hz: Option<f64>) -> Result<Vec<usize>, TimeBaseError> {
         let wanted = WantedRows { part: Some(part), ..WantedRows::all(stated_hz) };
         let mut filter = PartFilter::new(wanted, None);
         let samples = &self.recording.samples;
-        let is_inside = |sample: &RecordedSample| {
-            let TimeStamp { index, time_s } = sample.time_stamp;
-            let mut batch: Batch = Batch {
-                rows: 1,
-                times: time_s.filter(|_| self.has_times).into_iter().collect(),
-                indices: index.filter(|_| self.has_indices).into_iter().collect(),
-                ..Batch::default()
-            };
-            filter.apply(&mut batch)?;
-            Ok(batch.rows == 1)
-        };
-        let inside = samples.iter().map(is_inside).collect::<Result<_, TimeBaseError>>()?;
+        let mut batch = Batch { verdicts: (0..samples.len()).collect(), ..self.stamps(samples) };
+        filter.apply(&mut batch)?;
         filter.finish()?;
-        Ok(inside)
+        Ok(batch.verdicts)
+    }
+
+    fn stamps<V>(&self, samples: &[RecordedSample]) -> Batch<V> {
+        let times = samples.iter().filter_map(|sample| sample.time_stamp.time_s);
+        let indices = samples.iter().filter_map(|sample| sample.time_stamp.index);
+        Batch {
+            rows: samples.len(),
+            times: if self.has_times { times.collect() } else { Vec::new() },
+            indices: if self.has_indices { indices.collect() } else { Vec::new() },
+            ..Batch::default()
+        }
     }
 
     fn read(&self, wanted: WantedRows, give: &mut dyn FnMut(Batch<Verdict>) -> bool) -> Result<RowsRead, StreamError> {
@@ -161,16 +163,11 @@ impl<'a> RecordedRows<'a> {
         let samples = &samples[..samples.len().min(usize::try_from(wanted.most_rows).unwrap_or(usize::MAX))];
         let mut filter = PartFilter::new(wanted, None);
         for part in samples.chunks(wanted.batch_rows) {
-            let times = part.iter().filter_map(|sample| sample.time_stamp.time_s);
-            let indices = part.iter().filter_map(|sample| sample.time_stamp.index);
             let column = |&channel: &Channel| part.iter().map(|of| f64::from(of.counts.get(channel))).collect();
             let mut batch = Batch {
-                rows: part.len(),
-                times: if self.has_times { times.collect() } else { Vec::new() },
-                indices: if self.has_indices { indices.collect() } else { Vec::new() },
                 values: self.recording.channels.iter().map(column).collect(),
                 verdicts: part.iter().map(RecordedSample::verdict).collect(),
-                backwards: Vec::new(),
+                ..self.stamps(part)
             };
             let may_go_on = filter.apply(&mut batch)?;
             if !give(batch) || !may_go_on {
@@ -178,6 +175,6 @@ impl<'a> RecordedRows<'a> {
             }
         }
         filter.finish()?;
-        Ok(RowsRead { rows: samples.len() as u64, ..RowsRead::default() })
+        Ok(RowsRead { rows: samples.len() as u64, damage: self.recording.damage.clone(), ..RowsRead::default() })
     }
 }

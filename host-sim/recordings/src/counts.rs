@@ -5,4 +5,3 @@ pub mod frame_log;
 pub mod numpy_matrix;
 pub mod recorded_file;
 pub mod serial;
-pub mod spi_export;

@@ -1,7 +1,7 @@
 //! Formats: ADIS16405 counts and bus logs, or any sensor.
 
 use crate::batch_source::{BatchSource, field};
-use crate::counts::{count_table_writer, frame_log, serial, spi_export};
+use crate::counts::{count_table_writer, frame_log, recorded_file, serial};
 use adis16405_driver::{Channel, GyroRange};
 use measurement::{SensorProfile, adis16405};
 use readers::inspection::InspectedTable;
@@ -77,14 +77,6 @@ impl RecordedInput {
     ///
     /// # Errors
     /// They have none of the formats, or are too many once they are decompressed.
-    pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
-        Self::in_memory_monitored(name, bytes, &ReadMonitor::default())
-    }
-
-    /// [`in_memory`](Self::in_memory) with a monitor.
-    ///
-    /// # Errors
-    /// As [`in_memory`](Self::in_memory).
     pub fn in_memory_monitored(
         name: &Path,
         bytes: impl Into<Arc<[u8]>>,
@@ -113,7 +105,7 @@ impl RecordedInput {
         let format = match file.format() {
             FileFormat::TextTable => match file.first_line()?.as_str() {
                 frame_log::HEADER => RecordedFormat::FrameLog,
-                header if spi_export::is_header(header) => RecordedFormat::SpiExport,
+                header if recorded_file::is_export(header) => RecordedFormat::SpiExport,
                 header if count_table_writer::is_header(header) => RecordedFormat::CountTable,
                 _ => RecordedFormat::File(FileFormat::TextTable),
             },
@@ -154,7 +146,8 @@ impl RecordedInput {
     fn check_columns(&self) -> Result<(), InputError> {
         match self.format {
             RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
-                Err(InputError::file(self.name(), Reason::FrameLog))
+                let told = "this is an SPI frame log; read it with `replay`";
+                Err(InputError::file(self.name(), Reason::other(told)))
             }
             RecordedFormat::CountTable | RecordedFormat::File(_) => Ok(()),
         }

@@ -10,7 +10,7 @@ mod reading;
 pub mod recording;
 pub mod time_base;
 
-pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial, spi_export};
+pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial};
 pub use readers::{
     ColumnSelection, FileBytes, FileHash, InputError, MemoryArray, MemoryColumn, MemoryTable, Number, Printable,
     ReadMonitor, ReadOptions, ReadPass, Reason, SelectionError, inspection, read_on_one_thread,

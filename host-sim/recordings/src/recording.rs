@@ -65,6 +65,8 @@ pub struct Recording {
     /// Sets the size of gyroscope counts.
     pub range: GyroRange,
     pub samples: Vec<RecordedSample>,
+    /// The reason, if it ends early.
+    pub damage: Option<String>,
 }
 
 /// Builds a [`Recording`] burst by burst.
@@ -86,7 +88,7 @@ impl Recorder {
             Faults::all() - Faults::REPEATED - Faults::FROZEN
         };
         Self {
-            recording: Recording { channels, range, samples: Vec::new() },
+            recording: Recording { channels, range, samples: Vec::new(), damage: None },
             validator: BurstValidator::default().with_refused_faults(detectable & Faults::REFUSED),
             detectable,
         }

@@ -24,7 +24,7 @@ fn base(times: impl IntoIterator<Item = f64>) -> Result<EstimatedTimeBase, TimeB
 /// Rate, samples that are missing, and those of them that are uncertain.
 fn found(times: impl IntoIterator<Item = f64>) -> (f64, u64, u64) {
     let EstimatedTimeBase { measurement, stamps } = base(times).expect("a time base");
-    (measurement.sample_rate_hz, measurement.dropped["gap"], stamps.expect("stamps").uncertain_losses())
+    (measurement.sample_rate_hz, measurement.dropped["gap"], stamps.expect("stamps").uncertain)
 }
 
 /// `index` at 100 Hz, written with two decimals.

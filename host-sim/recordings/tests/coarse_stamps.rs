@@ -237,7 +237,7 @@ fn losses_between_exact_time_stamps_are_certain() {
         let stamps = base.stamps.expect("time stamps");
         let lost: u64 = stamps.losses.iter().map(|loss| loss.missing).sum();
         assert_eq!(times.len() as u64 + lost, 30_000, "{rate_hz} Hz");
-        assert_eq!(stamps.uncertain_losses(), 0, "{rate_hz} Hz, {decimals} decimals");
+        assert_eq!(stamps.uncertain, 0, "{rate_hz} Hz, {decimals} decimals");
     }
 }
 

@@ -1,7 +1,7 @@
 //! A recording over a serial link: the device restarts or hangs up, or the log cannot be written.
 
 use link::{Encoder, MessageRef, RawBurst, RawMessage};
-use recordings::frame_log::FrameLogReader;
+use recordings::recorded_file::FrameReader;
 use recordings::serial::{SerialLink, SerialRecordingError, record};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
@@ -48,9 +48,10 @@ fn messages(encoder: &mut Encoder, first: u64, at_us: u64, count: u64) -> VecDeq
 }
 
 fn times(log: &Path) -> Vec<f64> {
-    let mut reader = FrameLogReader::open(log).expect("a log");
+    let mut reader = FrameReader::open(&log.into()).expect("opened").expect("a log");
     let mut times = Vec::new();
-    while let Some(frame) = reader.next().expect("a line that can be read") {
+    while let Some(captured) = reader.next().expect("a line that can be read") {
+        let frame = captured.frame;
         if frame.mosi.len() == 26 {
             times.push(frame.time_s);
         }

@@ -1,6 +1,6 @@
 //! The times of a captured bus, compared with the limits of the data sheet.
 
-use recordings::spi_export::CapturedFrame;
+use recordings::recorded_file::CapturedFrame;
 use virtual_sensor::{MAX_SCK_BURST_HZ, MAX_SCK_NORMAL_HZ, MIN_READ_RATE_NORMAL_NS, MIN_STALL_NORMAL_NS};
 
 /// Fraction by which a clock may seem too fast: the capture has ticks, and chip select is low for longer than the clock runs.

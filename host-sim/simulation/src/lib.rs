@@ -16,7 +16,7 @@ pub use bus_timing::CapturedBusTiming;
 pub use device::Device;
 pub use fault_injector::{FaultEnd, FaultyBus, FrameFault, InjectedFaults};
 pub use line_fault::{LineFault, RandomFault};
-pub use replay::{Replay, replay, replay_log, replay_table};
+pub use replay::{Replay, replay};
 pub use sample_audit::SampleAudit;
 pub use scenario_text::ScenarioTextError;
 pub use simulation::{HostClock, LONGEST_S, SAMPLE_RATE_HZ, Simulation, SimulationError, TimedFault};

@@ -8,7 +8,7 @@ use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Co
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::count_table;
-use recordings::frame_log::{Frame, FrameLogReader};
+use recordings::frame_log::Frame;
 use recordings::recorded_file::FrameReader;
 use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
 use recordings::{FileBytes, InputError, Reason, SelectionError};
@@ -39,14 +39,10 @@ pub fn replay(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, In
 }
 
 /// Replays a table of counts: every row as the burst that the part would have sent.
-///
-/// # Errors
-/// Those of [`replay`].
-pub fn replay_table(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
-    let file = &file.into();
+fn replay_table(file: &FileBytes, range: GyroRange) -> Result<Replay, InputError> {
     let mut recorder: Option<Recorder> = None;
     let mut player = Player::new();
-    count_table::for_each_row(file, range, |channels, time_stamp, counts| {
+    let damage = count_table::for_each_row(file, range, |channels, time_stamp, counts| {
         let answer = Burst::from_counts(&counts).to_bytes();
         let burst = player.burst(&BURST_REQUEST, &answer)?;
         recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), range)).push(time_stamp, &burst);
@@ -55,23 +51,17 @@ pub fn replay_table(file: impl Into<FileBytes>, range: GyroRange) -> Result<Repl
     .map_err(|error| match &error.reason {
         // No option assigns columns to channels here.
         Reason::Selection(selection) if matches!(**selection, SelectionError::NoChannel(_)) => {
-            InputError { reason: Reason::NoChannel, ..error }
+            let told = "no known column; expected names such as gyro_x_counts";
+            InputError { reason: Reason::other(told), ..error }
         }
         _ => error,
     })?;
     let recording = recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file.name(), Reason::NoData))?;
+    let recording = Recording { damage, ..recording };
     Ok(Replay { recording, other_transactions: 0, timing: CapturedBusTiming::default() })
 }
 
-/// Replays a frame log. The range is `range` unless a write to SENS_AVG before the first burst selects another.
-///
-/// # Errors
-/// Those of [`replay`], or the log has no burst, or bursts of two ranges.
-pub fn replay_log(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
-    let file = &file.into();
-    replay_frames(file, FrameReader::Log(FrameLogReader::open(file)?), range)
-}
-
+/// The range is `range` unless a write to SENS_AVG before the first burst selects another.
 fn replay_frames(file: &FileBytes, mut frames: FrameReader, range: GyroRange) -> Result<Replay, InputError> {
     // The range that the log selected last, and the range of the bursts so far.
     let (mut selected, mut taken_in) = (range, range);
@@ -88,7 +78,10 @@ fn replay_frames(file: &FileBytes, mut frames: FrameReader, range: GyroRange) ->
                 recorder.set_range(selected);
                 taken_in = selected;
             } else if selected != taken_in {
-                let reason = Reason::MixedRange { before: full_scale(taken_in), now: full_scale(selected) };
+                let (before, now) = (full_scale(taken_in), full_scale(selected));
+                let reason = Reason::other(format!(
+                    "the gyro range changes from {before} to {now} deg/s between bursts; give each range its own log"
+                ));
                 return Err(InputError::line(file.name(), frames.line(), reason));
             }
             if bursts == MAX_SAMPLES {
@@ -105,9 +98,11 @@ fn replay_frames(file: &FileBytes, mut frames: FrameReader, range: GyroRange) ->
         }
     }
     if bursts == 0 {
-        return Err(InputError::file(file.name(), Reason::NoBurst));
+        let told = "no burst transaction (26 bytes that start with 3E00)";
+        return Err(InputError::file(file.name(), Reason::other(told)));
     }
-    Ok(Replay { recording: recorder.finish(), other_transactions, timing })
+    let recording = Recording { damage: frames.take_damage(bursts), ..recorder.finish() };
+    Ok(Replay { recording, other_transactions, timing })
 }
 
 /// The driver on a replay bus.
@@ -125,7 +120,7 @@ impl Player {
     /// Makes the driver read one recorded transaction.
     fn burst(&mut self, mosi: &[u8], miso: &[u8]) -> Result<Burst, Reason> {
         self.bus.load(mosi, miso);
-        self.driver.burst().map_err(|e| Reason::Bus(e.to_string()))
+        self.driver.burst().map_err(|e| Reason::other(format!("replay over the bus: {e}")))
     }
 }
 

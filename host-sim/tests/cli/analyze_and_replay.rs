@@ -35,6 +35,26 @@ fn a_recorded_simulation_replays_to_the_same_report() {
     }
 }
 
+/// A table or a log, plain or compressed, without its last bytes.
+#[test]
+fn what_was_read_of_a_text_that_is_cut_is_used_by_every_command() {
+    let dir = tempdir().expect("a folder");
+    let path = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
+    for (format, name) in [("table", "a.csv"), ("table", "b.csv.gz"), ("frames", "c.csv"), ("frames", "d.csv.gz")] {
+        let (file, converted) = (path(name), path(&format!("{name}.out.csv")));
+        let simulated = imunoise(&["simulate", &file, "--format", format, "--seconds", "5", "--seed", "7"]);
+        assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
+        let whole = std::fs::read(&file).expect("written");
+        std::fs::write(&file, &whole[..whole.len() - 12]).expect("written");
+        for arguments in [&["analyze", &file][..], &["replay", &file], &["convert", &file, &converted]] {
+            let output = imunoise(arguments);
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(3), "{arguments:?}: {errors}");
+            assert!(errors.contains("not read to its end"), "{arguments:?}: {errors}");
+        }
+    }
+}
+
 /// In the JSON, on the screen, on the page and by the exit code; in a report of many as in that of one.
 #[test]
 fn a_file_that_is_cut_is_told_everywhere() {

@@ -1,11 +1,10 @@
 //! Sample periods of rows by stamps or index, and repeated rows; fine stamps are placed at once, coarse ones at the
 //! end.
 
-use crate::aligned_stamps::AlignedStamps;
 use crate::irregular_stamps::of_few_digits;
 use crate::lateness_track::COARSE;
 use crate::stamp_alignment::uncertain;
-use crate::stamp_quality::StampQuality;
+use crate::stamp_quality::{AlignedStamps, StampQuality};
 use crate::stream_clock::{Placed, Stamp, StreamClock};
 use crate::time_base_error::{MIN_SAMPLES, TimeBaseError};
 use std::collections::{BTreeMap, VecDeque};
@@ -142,10 +141,11 @@ impl Clock {
     /// For another reading.
     pub fn again(&self) -> Result<Self, TimeBaseError> {
         let state = match &self.state {
-            State::Stream(stream) => State::Stream(Box::new(stream.again()?)),
-            State::Known(Known { places, .. }) => {
-                State::Known(Known { places: Arc::clone(places), next_row: 0, next_arrived: 0 })
+            State::Stream(stream) => {
+                let Stream { repeats, has_index, first_rows, all_rows, .. } = stream.as_ref();
+                State::Stream(Box::new(Stream::new(*repeats, *has_index, first_rows.clone(), all_rows.clone())?))
             }
+            State::Known(Known { places, .. }) => State::Known(Known::new(Arc::clone(places))),
             State::FirstRows(_) | State::Coarse(_) => State::FirstRows(Vec::new()),
         };
         Ok(Self { stated_hz: self.stated_hz, state, ignored: self.ignored.clone() })
@@ -186,17 +186,17 @@ impl Clock {
                     return Ok(Vec::new());
                 }
                 let Coarse { times_s, repeated, .. } = coarse;
-                let (times_s, repeated) = (std::mem::take(times_s), std::mem::take(repeated));
                 let rows = times_s.len();
-                let places = align(&times_s, repeated, self.stated_hz).or_else(|error| match self.stated_hz {
-                    Some(_) if is_of_stamps(&error) => {
-                        self.ignored = Some(format!("the time stamps are ignored: {error}"));
-                        Ok(KnownPlaces::of_rows(rows))
-                    }
-                    _ => Err(error),
-                })?;
+                let places =
+                    align(times_s, std::mem::take(repeated), self.stated_hz).or_else(|error| match self.stated_hz {
+                        Some(_) if is_of_stamps(&error) => {
+                            self.ignored = Some(format!("the time stamps are ignored: {error}"));
+                            Ok(KnownPlaces::of_rows(rows))
+                        }
+                        _ => Err(error),
+                    })?;
                 let count = places.periods.len() + places.repeated.len();
-                let mut known = Known { places: Arc::new(places), next_row: 0, next_arrived: 0 };
+                let mut known = Known::new(Arc::new(places));
                 let placed = known.next(count);
                 self.state = State::Known(known);
                 Ok(placed)
@@ -206,10 +206,7 @@ impl Clock {
     }
 
     fn row_clock(&self) -> Result<State, TimeBaseError> {
-        let (repeats, clock) = (RepeatRule { shortest_s: 0.0 }, StreamClock::new(false, None)?);
-        let (before_s, waiting, first_rows, all_rows) = (None, VecDeque::new(), None, None);
-        let stream = Stream { clock, repeats, before_s, waiting, has_index: false, first_rows, all_rows };
-        Ok(State::Stream(Box::new(stream)))
+        Ok(State::Stream(Box::new(Stream::new(RepeatRule { shortest_s: 0.0 }, false, None, None)?)))
     }
 
     /// Reason to ignore the stamps.
@@ -273,12 +270,11 @@ fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<Stat
     let repeats = RepeatRule::new(rows, stated_hz);
     let has_index = rows.first().is_some_and(|row| row.index.is_some());
     let is_short = (rows.len() as u64) < MIN_SAMPLES;
-    let stream = |clock: StreamClock, first_rows: Option<StampQuality>, all_rows: Option<StampQuality>| {
-        let (before_s, waiting) = (None, VecDeque::new());
-        State::Stream(Box::new(Stream { clock, repeats, before_s, waiting, has_index, first_rows, all_rows }))
+    let stream = |first_rows: Option<StampQuality>, all_rows: Option<StampQuality>| {
+        Stream::new(repeats, has_index, first_rows, all_rows).map(|stream| State::Stream(Box::new(stream)))
     };
     let Some(times) = times_of(rows).filter(|_| !is_short) else {
-        return Ok(stream(StreamClock::new(has_index, None)?, None, None));
+        return stream(None, None);
     };
     let mut repeated = Vec::new();
     let mut before_s = None;
@@ -294,8 +290,7 @@ fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<Stat
         let indices: Vec<u64> = arrived.iter().filter_map(|&at| rows[at].index).collect();
         let times: Vec<f64> = arrived.iter().map(|&at| times[at]).collect();
         let quality = StampQuality::of_index(&indices, &times);
-        let clock = StreamClock::new(true, Some(&quality))?;
-        return Ok(stream(clock, Some(quality.clone()), Some(quality).filter(|_| is_all)));
+        return stream(Some(quality.clone()), Some(quality).filter(|_| is_all));
     }
     let coarse = State::Coarse(Coarse { repeats, times_s: Vec::new(), repeated: Vec::new() });
     let places = match align(&times, repeated, stated_hz) {
@@ -304,10 +299,10 @@ fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<Stat
         places => places?,
     };
     if is_all {
-        return Ok(State::Known(Known { places: Arc::new(places), next_row: 0, next_arrived: 0 }));
+        return Ok(State::Known(Known::new(Arc::new(places))));
     }
-    match StreamClock::new(false, Some(&places.stamps)) {
-        Ok(clock) => Ok(stream(clock, Some(places.stamps), None)),
+    match stream(Some(places.stamps), None) {
+        Ok(stream) => Ok(stream),
         _ if of_few_digits(&times).is_some() => Ok(coarse),
         Err(TimeBaseError::Irregular(_)) => Ok(coarse),
         Err(error) => Err(error),
@@ -315,16 +310,14 @@ fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<Stat
 }
 
 impl Stream {
-    fn again(&self) -> Result<Self, TimeBaseError> {
-        Ok(Self {
-            clock: StreamClock::new(self.has_index, self.first_rows.as_ref())?,
-            repeats: self.repeats,
-            before_s: None,
-            waiting: VecDeque::new(),
-            has_index: self.has_index,
-            first_rows: self.first_rows.clone(),
-            all_rows: self.all_rows.clone(),
-        })
+    fn new(
+        repeats: RepeatRule,
+        has_index: bool,
+        first_rows: Option<StampQuality>,
+        all_rows: Option<StampQuality>,
+    ) -> Result<Self, TimeBaseError> {
+        let clock = StreamClock::new(has_index, first_rows.as_ref())?;
+        Ok(Self { clock, repeats, before_s: None, waiting: VecDeque::new(), has_index, first_rows, all_rows })
     }
 
     fn place(&mut self, rows: &[RowStamp], is_last: bool) -> Vec<Place> {
@@ -371,6 +364,10 @@ impl Coarse {
 }
 
 impl Known {
+    fn new(places: Arc<KnownPlaces>) -> Self {
+        Self { places, next_row: 0, next_arrived: 0 }
+    }
+
     fn next(&mut self, rows: usize) -> Vec<Place> {
         let KnownPlaces { periods, repeated, .. } = self.places.as_ref();
         let place = |row: usize| {
@@ -402,42 +399,19 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
     let mut arrived_s = times_at(&positions);
     let mut alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
     // Coarse stamps: the number of samples tells repeats.
-    if alignment.width >= COARSE && take_back(&mut repeated, &positions, &alignment) {
+    if alignment.quality.width >= COARSE && take_back(&mut repeated, &positions, &alignment.quality) {
         positions = arrived(&repeated);
         arrived_s = times_at(&positions);
         alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
     }
     match stated_hz {
-        Some(stated_hz) => contradiction(&arrived_s, &alignment, stated_hz)?,
-        None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
+        Some(stated_hz) => contradiction(&arrived_s, &alignment.quality, stated_hz)?,
+        None if alignment.quality.rate.is_none() => return Err(TimeBaseError::NoPeriod),
         None => {}
     }
-    let AlignedStamps {
-        periods,
-        late,
-        mut losses,
-        rate,
-        tick_s,
-        width,
-        resolved,
-        least_loss,
-        is_rate_changing,
-        is_of_loop,
-    } = alignment;
-    losses.iter_mut().for_each(|loss| loss.before = positions[loss.before]);
-    let stamps = StampQuality {
-        rate,
-        tick_s,
-        width,
-        uncertain: uncertain(&losses, resolved),
-        losses,
-        resolved,
-        least_loss,
-        is_rate_changing,
-        is_of_loop,
-        late: late.into_iter().filter(|late| *late).count() as u64,
-        clock_steps: Vec::new(),
-    };
+    let AlignedStamps { periods, quality: mut stamps } = alignment;
+    stamps.losses.iter_mut().for_each(|loss| loss.before = positions[loss.before]);
+    stamps.uncertain = uncertain(&stamps.losses, stamps.resolved);
     // Saturated periods.
     if !periods.is_sorted_by(|one, next| one < next) {
         let periods = periods.last().map_or(0, |last| last.saturating_add(1));
@@ -447,11 +421,11 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
 }
 
 /// Takes chance repeats back, if the coarse stamps at `arrived` lack as many samples; true if any.
-fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], alignment: &AlignedStamps) -> bool {
-    let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
+fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], quality: &StampQuality) -> bool {
+    let reach = (SEARCHED_WIDTHS * quality.width).ceil() as usize;
     let mut taken = Vec::new();
     let mut candidates = repeated.iter().copied().peekable();
-    for loss in &alignment.losses {
+    for loss in &quality.losses {
         let first = arrived[loss.before.saturating_sub(reach)];
         let last = arrived[(loss.before + reach / 4).min(arrived.len() - 1)];
         let mut missing = loss.missing;
@@ -475,14 +449,14 @@ fn usual_interval(times: &[f64]) -> Option<f64> {
     (duration > 0.0 && duration.is_finite()).then_some(duration / window as f64)
 }
 
-fn contradiction(times: &[f64], alignment: &AlignedStamps, stated_hz: f64) -> Result<(), TimeBaseError> {
+fn contradiction(times: &[f64], quality: &StampQuality, stated_hz: f64) -> Result<(), TimeBaseError> {
     let differs = |measured_hz: f64| (measured_hz / stated_hz - 1.0).abs() > MAX_RATE_CONTRADICTION;
-    let few_neighbours = (alignment.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
-    if !few_neighbours && !alignment.rate.is_some_and(|rate| differs(rate.hz)) {
+    let few_neighbours = (quality.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
+    if !few_neighbours && !quality.rate.is_some_and(|rate| differs(rate.hz)) {
         return Ok(());
     }
-    match AlignedStamps::new(times, None) {
-        Some(AlignedStamps { rate: Some(rate), losses, .. }) if differs(rate.hz) && losses.len() <= times.len() / 4 => {
+    match AlignedStamps::new(times, None).map(|alignment| alignment.quality) {
+        Some(StampQuality { rate: Some(rate), losses, .. }) if differs(rate.hz) && losses.len() <= times.len() / 4 => {
             Err(TimeBaseError::RateContradictsStamps { stated_hz, measured_hz: rate.hz })
         }
         _ => Ok(()),

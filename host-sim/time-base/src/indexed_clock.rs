@@ -1,8 +1,6 @@
 //! Stamps beside an index: rate, and contradictions.
 
-use crate::aligned_stamps::RateEstimate;
-use crate::lateness_track::slope;
-use crate::lower_envelope::minimum_ahead;
+use crate::lateness_track::{MIN_RATE_ERROR, RateEstimate, minimum_ahead, range_of_blocks, slope};
 
 const MAX_QUEUE: usize = 64;
 /// Window lengths for a first period.
@@ -12,10 +10,6 @@ pub(crate) const STEP_PERIODS: f64 = 16.0;
 pub(crate) const STEP_S: f64 = 0.25;
 /// Per sample.
 const PHASE_TRACKING: f64 = 1.0 / 64.0;
-/// Blocks for the rate's interval.
-const BLOCKS: usize = 16;
-/// Relative; rounding in f64.
-const MIN_RATE_ERROR: f64 = 1e-9;
 
 /// A jump of the host's clock against the index.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,18 +39,12 @@ impl IndexedClock {
             corrected = without(times, &steps);
         }
         let Some(slope_s) = slope(indices, &corrected, |_| true) else { return none };
-        let block = (times.len() / BLOCKS).max(1);
         let residual = |at: usize| (corrected[at] - corrected[0]) / slope_s - (indices[at] - indices[0]) as f64;
         let positions: Vec<usize> = (0..times.len()).collect();
-        let (low, high) = positions
-            .chunks_exact(block)
-            .map(|block| block.iter().map(|&at| residual(at)).sum::<f64>() / block.len() as f64)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (mean.min(low), mean.max(high)));
         let span = (indices[indices.len() - 1] - indices[0]).max(1) as f64;
-        let error = (high - low) / span + MIN_RATE_ERROR;
+        let error = range_of_blocks(&positions, residual) / span + MIN_RATE_ERROR;
         let hz = slope_s.recip();
-        let rate = RateEstimate { hz, low_hz: hz * (1.0 - error), high_hz: hz * (1.0 + error) };
-        Self { rate: (hz.is_finite() && hz > 0.0).then_some(rate), steps }
+        Self { rate: RateEstimate::new(hz, hz * (1.0 - error), hz * (1.0 + error)), steps }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Stamps without a steady fine clock: polling loops, few digits, ticks of many samples; they look like losses.
 
-use crate::aligned_stamps::{AlignedStamps, RateEstimate};
-use crate::lateness_track::{LONG, LostStretch, quantile};
+use crate::lateness_track::{LONG, LostStretch, RateEstimate, quantile};
+use crate::stamp_quality::{AlignedStamps, StampQuality};
 
 /// Rows that make up for a late one.
 const CATCHES_UP: usize = 16;
@@ -55,19 +55,9 @@ pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamp
     let span_s = times.last()? - times.first()? - missing_s;
     let hz = (times.len() - 1) as f64 / span_s;
     let (low_hz, high_hz) = if longest_s > 0.0 { (longest_s.recip(), shortest_s.recip()) } else { (hz, hz) };
-    let rate = RateEstimate { hz, low_hz: low_hz.min(hz), high_hz: high_hz.max(hz) };
-    Some(AlignedStamps {
-        periods,
-        late: vec![false; times.len()],
-        losses,
-        rate: (hz.is_finite() && hz > 0.0).then_some(rate),
-        tick_s,
-        width: 0.0,
-        resolved: true,
-        least_loss: 1,
-        is_rate_changing: true,
-        is_of_loop: true,
-    })
+    let rate = RateEstimate::new(hz, low_hz.min(hz), high_hz.max(hz));
+    let fine = StampQuality { losses, rate, tick_s, resolved: true, least_loss: 1, ..StampQuality::default() };
+    Some(AlignedStamps { periods, quality: StampQuality { is_rate_changing: true, is_of_loop: true, ..fine } })
 }
 
 /// True for ticks of many samples.
@@ -120,19 +110,10 @@ pub(crate) fn by_ticks(times: &[f64], tick_s: f64, stated_hz: Option<f64>) -> Op
         }
         periods.push(at as u64 + missing);
     }
-    let rate = RateEstimate { hz, low_hz: (hz - error).max(hz / 2.0), high_hz: hz + error };
-    Some(AlignedStamps {
-        periods,
-        late: vec![false; times.len()],
-        losses,
-        rate: (hz.is_finite() && hz > 0.0).then_some(rate),
-        tick_s: Some(tick_s),
-        width: tick_s * hz,
-        resolved: true,
-        least_loss: 1,
-        is_rate_changing: false,
-        is_of_loop: false,
-    })
+    let rate = RateEstimate::new(hz, (hz - error).max(hz / 2.0), hz + error);
+    let (tick_s, width, least_loss) = (Some(tick_s), tick_s * hz, 1);
+    let quality = StampQuality { losses, rate, tick_s, width, resolved: true, least_loss, ..StampQuality::default() };
+    Some(AlignedStamps { periods, quality })
 }
 
 /// Few digits: rounded as the last ones; `None` for others.

@@ -1,6 +1,6 @@
 //! Lateness against a fixed period: lower envelope, losses, description length.
 
-use crate::lower_envelope::{MinimumBehind, minimum_ahead};
+use std::collections::VecDeque;
 
 /// Samples of the envelope during the search: a period off by 1/200 hides a loss in 200.
 pub(crate) const SEARCH_QUEUE: usize = 64;
@@ -41,7 +41,25 @@ const UNIFORM_MEDIAN_DEVIATION: f64 = 0.25;
 /// Blocks for the rate's interval.
 const BLOCKS: usize = 16;
 /// Relative; rounding in f64.
-const MIN_RATE_ERROR: f64 = 1e-9;
+pub(crate) const MIN_RATE_ERROR: f64 = 1e-9;
+
+/// Sample rate with its interval by the stamps' clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateEstimate {
+    /// Least-squares slope, Hz.
+    pub hz: f64,
+    /// Lower end, Hz.
+    pub low_hz: f64,
+    /// Upper end, Hz.
+    pub high_hz: f64,
+}
+
+impl RateEstimate {
+    /// `None` without a time span.
+    pub(crate) fn new(hz: f64, low_hz: f64, high_hz: f64) -> Option<Self> {
+        (hz.is_finite() && hz > 0.0).then_some(Self { hz, low_hz, high_hz })
+    }
+}
 
 /// Samples that were lost between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -225,20 +243,22 @@ impl Track {
     /// Range of 16 blocks' mean residuals over the length: four standard errors, or the drift.
     pub(crate) fn slope_error(&self, times: &[f64], slope_s: f64) -> f64 {
         let on_time: Vec<usize> = (0..times.len()).filter(|at| !self.is_late(*at)).collect();
-        let length = (on_time.len() / BLOCKS).max(1);
-        let mean = |block: &[usize]| {
-            block.iter().map(|&at| (times[at] - times[0]) / slope_s - self.periods[at] as f64).sum::<f64>()
-                / block.len() as f64
-        };
-        let (low, high) = on_time
-            .chunks_exact(length)
-            .map(mean)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (mean.min(low), mean.max(high)));
+        let range = range_of_blocks(&on_time, |at| (times[at] - times[0]) / slope_s - self.periods[at] as f64);
         let span = self.periods.last().map_or(1.0, |&last| (last as f64).max(1.0));
         // Ticks near a fraction of the period move the line.
         let rounding = if self.width < COARSE { self.width } else { self.width / (on_time.len() as f64).sqrt() };
-        (high - low).max(rounding) / span + MIN_RATE_ERROR
+        range.max(rounding) / span + MIN_RATE_ERROR
     }
+}
+
+/// Range of the mean residuals of 16 blocks of `positions`.
+pub(crate) fn range_of_blocks(positions: &[usize], residual: impl Fn(usize) -> f64) -> f64 {
+    let means = positions
+        .chunks_exact((positions.len() / BLOCKS).max(1))
+        .map(|block| block.iter().map(|&at| residual(at)).sum::<f64>() / block.len() as f64);
+    let (low, high) =
+        means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (mean.min(low), mean.max(high)));
+    high - low
 }
 
 /// Positions, and geometric lengths.
@@ -297,4 +317,52 @@ pub(crate) fn slope(periods: &[u64], times: &[f64], admitted: impl Fn(usize) -> 
     });
     let slope_s = xy / xx;
     (slope_s.is_finite() && slope_s > 0.0).then_some(slope_s)
+}
+
+/// For each value and the `window − 1` after it.
+pub(crate) fn minimum_ahead(values: &[f64], window: usize) -> Vec<f64> {
+    let mut least = vec![0.0; values.len()];
+    // Increasing positions; the back is the minimum.
+    let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window.min(values.len()));
+    for at in (0..values.len()).rev() {
+        while candidates.front().is_some_and(|&ahead| values[ahead] >= values[at]) {
+            candidates.pop_front();
+        }
+        candidates.push_front(at);
+        while candidates.back().is_some_and(|&ahead| ahead >= at + window) {
+            candidates.pop_back();
+        }
+        least[at] = candidates.back().map_or(values[at], |&ahead| values[ahead]);
+    }
+    least
+}
+
+pub(crate) struct MinimumBehind {
+    window: usize,
+    pushed: usize,
+    /// Increasing, with numbers; the front is the minimum.
+    candidates: VecDeque<(usize, f64)>,
+}
+
+impl MinimumBehind {
+    /// `window` is at least 1.
+    pub(crate) fn new(window: usize) -> Self {
+        Self { window, pushed: 0, candidates: VecDeque::new() }
+    }
+
+    pub(crate) fn push(&mut self, value: f64) {
+        while self.candidates.back().is_some_and(|&(_, newest)| newest >= value) {
+            self.candidates.pop_back();
+        }
+        self.candidates.push_back((self.pushed, value));
+        self.pushed += 1;
+        while self.candidates.front().is_some_and(|&(number, _)| number + self.window < self.pushed) {
+            self.candidates.pop_front();
+        }
+    }
+
+    /// The minimum; `None` before the first value.
+    pub(crate) fn minimum(&self) -> Option<f64> {
+        self.candidates.front().map(|&(_, least)| least)
+    }
 }

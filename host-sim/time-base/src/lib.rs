@@ -3,13 +3,11 @@
 //! [`StampOrder`] handles counters that wrap and clocks that are set; [`Clock`] places rows; [`StampQuality`] states
 //! doubts.
 
-mod aligned_stamps;
 mod clock;
 mod clock_rate;
 mod indexed_clock;
 mod irregular_stamps;
 mod lateness_track;
-mod lower_envelope;
 mod stamp_alignment;
 mod stamp_order;
 mod stamp_quality;
@@ -18,10 +16,9 @@ mod stream_clock;
 mod time_base_error;
 mod time_range;
 
-pub use aligned_stamps::RateEstimate;
 pub use clock::{Clock, Place, RowStamp};
 pub use indexed_clock::ClockStep;
-pub use lateness_track::{LostStretch, quantile};
+pub use lateness_track::{LostStretch, RateEstimate, quantile};
 pub use stamp_order::{Order, ROWS_OF_FIRST, ROWS_OF_SET_CLOCK, StampOrder};
 pub use stamp_quality::StampQuality;
 pub use stream_clock::Placed;

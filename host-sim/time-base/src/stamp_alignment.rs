@@ -4,10 +4,10 @@
 //! the envelope for good, and coarse stamps spread `c` above it. The period with the shortest description of scatter
 //! and losses wins.
 
-pub(crate) use crate::aligned_stamps::{AlignedStamps, RateEstimate};
 use crate::clock_rate::{SteadiedStamps, steadied};
 use crate::irregular_stamps::{by_ticks, is_of_many, of_few_digits, of_loop};
-use crate::lateness_track::{COARSE, LostStretch, SEARCH_QUEUE, Track, persistent_variance, quantile};
+use crate::lateness_track::{COARSE, LostStretch, RateEstimate, SEARCH_QUEUE, Track, persistent_variance, quantile};
+use crate::stamp_quality::{AlignedStamps, StampQuality};
 use crate::stamp_tick::tick;
 
 /// Samples of the envelope: the deepest queue told from a loss.
@@ -65,14 +65,14 @@ impl AlignedStamps {
         let Some(SteadiedStamps { times: steady, shortest_s, longest_s }) = steadied(times) else {
             let alignment = Self::of_steady(times, stated_hz)?;
             // A stated rate has its own periods.
-            let is_free = alignment.is_of_loop && stated_hz.is_none();
+            let is_free = alignment.quality.is_of_loop && stated_hz.is_none();
             return if is_free { of_loop(times, tick_s) } else { Some(alignment) };
         };
         let mut alignment = Self::of_steady(&steady, stated_hz)?;
         let hz = *alignment.periods.last()? as f64 / (times.last()? - times.first()?);
-        let changing = RateEstimate { hz, low_hz: longest_s.recip(), high_hz: shortest_s.recip() };
-        alignment.rate = alignment.rate.filter(|_| hz.is_finite() && hz > 0.0).map(|_| changing);
-        alignment.is_rate_changing = true;
+        let changing = RateEstimate::new(hz, longest_s.recip(), shortest_s.recip());
+        alignment.quality.rate = alignment.quality.rate.and(changing);
+        alignment.quality.is_rate_changing = true;
         Some(alignment)
     }
 
@@ -106,11 +106,9 @@ impl AlignedStamps {
         }
         // Bounded by the durations' scatter.
         let hidden = if least_loss > 1 { persistent / (track.period_s * track.period_s) } else { 0.0 };
-        let mut alignment = Self::from_track(track, times, tick_s);
-        alignment.rate.iter_mut().for_each(|rate| rate.high_hz *= 1.0 + hidden);
-        alignment.least_loss = least_loss;
-        alignment.is_of_loop = is_of_loop;
-        Some(alignment)
+        let Self { periods, mut quality } = Self::from_track(track, times, tick_s);
+        quality.rate.iter_mut().for_each(|rate| rate.high_hz *= 1.0 + hidden);
+        Some(Self { periods, quality: StampQuality { least_loss, is_of_loop, ..quality } })
     }
 
     fn from_track(track: Track, times: &[f64], tick_s: Option<f64>) -> Self {
@@ -128,17 +126,14 @@ impl AlignedStamps {
             // Without the uncertain losses, or with overlooked ones.
             let rows_only = 1.0 - surplus / (samples + surplus);
             let overlooked = if resolved { confused } else { confused + OVERLOOKED * surplus };
-            let rate = RateEstimate {
-                hz,
-                low_hz: hz * (1.0 - error) * rows_only,
-                high_hz: hz * (1.0 + error) * (1.0 + overlooked / samples),
-            };
-            (hz.is_finite() && hz > 0.0).then_some(rate)
+            RateEstimate::new(hz, hz * (1.0 - error) * rows_only, hz * (1.0 + error) * (1.0 + overlooked / samples))
         });
-        let late = (0..times.len()).map(|at| track.is_late(at)).collect();
+        let late = (0..times.len()).filter(|at| track.is_late(*at)).count() as u64;
         let Track { periods, losses, width, .. } = track;
-        let (least_loss, is_rate_changing, is_of_loop) = (1, false, false);
-        Self { periods, late, losses, rate, tick_s, width, resolved, least_loss, is_rate_changing, is_of_loop }
+        let least_loss = 1;
+        let quality =
+            StampQuality { late, losses, rate, tick_s, width, resolved, least_loss, ..StampQuality::default() };
+        Self { periods, quality }
     }
 }
 

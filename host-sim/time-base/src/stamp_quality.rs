@@ -1,14 +1,20 @@
 //! Quality of a recording's time stamps.
 
-use crate::aligned_stamps::RateEstimate;
 use crate::indexed_clock::{ClockStep, IndexedClock};
-use crate::lateness_track::{COARSE, LostStretch};
+use crate::lateness_track::{COARSE, LostStretch, RateEstimate};
+
+/// Result of an alignment.
+pub(crate) struct AlignedStamps {
+    /// From the first; grows by at least one.
+    pub(crate) periods: Vec<u64>,
+    pub(crate) quality: StampQuality,
+}
 
 /// Evidence and doubts of the time stamps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StampQuality {
     pub rate: Option<RateEstimate>,
-    /// Common step, s; `None` below a twentieth of a period.
+    /// Common step of the stamps, s; `None` below a twentieth of a period.
     pub tick_s: Option<f64>,
     /// Lateness of ordinary samples (tick and jitter), periods; 0 with an index.
     pub width: f64,
@@ -24,6 +30,7 @@ pub struct StampQuality {
     pub is_rate_changing: bool,
     /// True for a polling loop, whose periods vary.
     pub is_of_loop: bool,
+    /// A period or more behind the others.
     pub late: u64,
     /// Contradictions between index and stamps.
     pub clock_steps: Vec<ClockStep>,
@@ -47,7 +54,7 @@ impl StampQuality {
     pub fn warnings(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let counts = [
             ("late_delivery", self.late),
-            ("uncertain_loss", self.uncertain_losses()),
+            ("uncertain_loss", self.uncertain),
             ("clock_step", self.clock_steps.len() as u64),
         ];
         counts.into_iter().filter(|(_, count)| *count > 0)
@@ -64,10 +71,10 @@ impl StampQuality {
                 self.width, rate.hz, rate.low_hz, rate.high_hz, self.width.ceil(),
             ));
         }
-        let uncertain: u64 = self.uncertain_losses();
-        if uncertain > 0 {
+        if self.uncertain > 0 {
             notes.push(format!(
-                "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
+                "{} lost samples are uncertain: the rounding of the time stamps may show the same",
+                self.uncertain
             ));
         }
         if let (Some(rate), true) = (self.rate, self.is_of_loop) {
@@ -96,10 +103,5 @@ impl StampQuality {
             ));
         }
         notes
-    }
-
-    /// Samples in losses with another possible explanation.
-    pub fn uncertain_losses(&self) -> u64 {
-        self.uncertain
     }
 }

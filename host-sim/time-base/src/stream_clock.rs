@@ -1,10 +1,8 @@
 //! Sample periods of rows read in blocks, in bounded memory, by the rule of [`lateness_track`](crate::lateness_track).
 
-use crate::aligned_stamps::RateEstimate;
 use crate::clock_rate::SteadyStream;
 use crate::indexed_clock::{ClockStep, STEP_PERIODS, STEP_S};
-use crate::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY, least_growth};
-use crate::lower_envelope::{MinimumBehind, minimum_ahead};
+use crate::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY, MinimumBehind, RateEstimate, least_growth, minimum_ahead};
 use crate::stamp_alignment::MAX_QUEUE;
 use crate::stamp_quality::StampQuality;
 use crate::time_base_error::TimeBaseError;

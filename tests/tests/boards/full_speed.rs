@@ -10,7 +10,7 @@ use recordings::frame_log::{Frame, FrameLogWriter};
 use recordings::serial::RawStreamRecorder;
 use recordings::time_base::measurement;
 use reports::json::ReportJson;
-use simulation::replay_log;
+use simulation::replay;
 use std::path::Path;
 
 const RATE_HZ: f64 = 819.2;
@@ -111,7 +111,7 @@ fn load_between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
 fn assert_recorded_stream_gives_the_identical_report(decoded: &Decoded, bursts: &[(u64, [u8; BURST_BYTES])]) {
     let folder = tempfile::tempdir().expect("a folder");
     let report = |file: &Path| {
-        let recording = replay_log(file, GyroRange::Dps300).expect("a log").recording;
+        let recording = replay(file, GyroRange::Dps300).expect("a log").recording;
         let measurement = measurement(&recording, Some(RATE_HZ)).expect("a time base");
         serde_json::to_string(&ReportJson::new(&analyze(&measurement), None)).expect("a report")
     };

@@ -1,5 +1,6 @@
 //! The columns of channels, time and index with their units, as the user says or by their names.
 
+use crate::columns;
 use crate::columns::unit::{COUNT, SECOND, Unit};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 
@@ -57,47 +58,15 @@ pub(crate) struct ChosenColumn {
 /// Why columns cannot be chosen.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SelectionError {
-    #[error("--columns {0}: expected CHANNEL=COLUMN, such as gyro_x=wx")]
-    NoAssignment(String),
-    #[error("--columns {name}=…: no such channel; {sensor} has {known}, and there are time and sample")]
-    UnknownChannel {
-        /// As given.
-        name: String,
-        sensor: String,
-        known: String,
-    },
-    #[error("{channel} is both {one} and {other}: say which with --columns")]
-    Ambiguous {
-        /// The channel.
-        channel: String,
-        one: String,
-        other: String,
-    },
-    #[error("no column {wanted}; the file has {available}")]
-    NoColumn {
-        /// As given.
-        wanted: String,
-        available: String,
-    },
     #[error("no column is named like a channel; say which is which, as in --columns gyro_x=NAME; the file has {0}")]
     NoChannel(String),
-    #[error("--units {unit}: not a known unit; known are {known}")]
-    UnknownUnit {
-        /// As given.
-        unit: String,
-        known: String,
-    },
-    #[error("--units {0} and {1} are of one quantity")]
-    TwoUnits(&'static str, &'static str),
-    #[error("column {column}: no unit of {channel}; give one, as in --units {example}")]
-    NoUnit {
-        column: String,
-        channel: String,
-        /// A unit of the channel.
-        example: &'static str,
-    },
-    #[error("column {0}: counts of which sensor? give its profile with --sensor")]
-    CountsOfAny(String),
+    /// Any other, as told.
+    #[error("{0}")]
+    Other(String),
+}
+
+fn ambiguous(channel: &str, one: &str, other: &str) -> SelectionError {
+    SelectionError::Other(format!("{channel} is both {one} and {other}: say which with --columns"))
 }
 
 /// The columns as the user states them.
@@ -117,17 +86,18 @@ impl ColumnSelection {
             Some((channel, column)) if !channel.trim().is_empty() && !column.trim().is_empty() => {
                 Ok((channel.trim().to_owned(), column.trim().to_owned()))
             }
-            _ => Err(SelectionError::NoAssignment(text.clone())),
+            _ => Err(SelectionError::Other(format!("--columns {text}: expected CHANNEL=COLUMN, such as gyro_x=wx"))),
         };
         let assignments: Vec<(String, String)> = columns.iter().map(assignment).collect::<Result<_, _>>()?;
         let mut known: Vec<Unit> = Vec::new();
         for text in units {
-            let unit = Unit::parse(text).ok_or_else(|| SelectionError::UnknownUnit {
-                unit: text.clone(),
-                known: Unit::names().collect::<Vec<_>>().join(", "),
+            let unit = Unit::parse(text).ok_or_else(|| {
+                let known = Unit::names().collect::<Vec<_>>().join(", ");
+                SelectionError::Other(format!("--units {text}: not a known unit; known are {known}"))
             })?;
             if let Some(other) = known.iter().find(|other| other.base == unit.base) {
-                return Err(SelectionError::TwoUnits(other.name, unit.name));
+                let told = format!("--units {} and {} are of one quantity", other.name, unit.name);
+                return Err(SelectionError::Other(told));
             }
             known.push(unit);
         }
@@ -287,20 +257,22 @@ impl ColumnSelection {
             let role = match name.as_str() {
                 "time" => Role::Time,
                 "sample" => Role::Index,
-                _ => sensor.channel(name).map(Role::Channel).ok_or_else(|| SelectionError::UnknownChannel {
-                    name: name.clone(),
-                    sensor: sensor.name.to_owned(),
-                    known: sensor.channels.iter().map(|channel| channel.name).collect::<Vec<_>>().join(", "),
+                _ => sensor.channel(name).map(Role::Channel).ok_or_else(|| {
+                    let known = sensor.channels.iter().map(|channel| channel.name).collect::<Vec<_>>().join(", ");
+                    SelectionError::Other(format!(
+                        "--columns {name}=…: no such channel; {} has {known}, and there are time and sample",
+                        sensor.name
+                    ))
                 })?,
             };
             let by_name = available.iter().position(|column| column.name == *wanted);
             let heading = AvailableColumn::from_heading(wanted);
             let position = by_name
                 .or_else(|| available.iter().position(|column| *column == heading))
-                .ok_or_else(|| SelectionError::NoColumn { wanted: wanted.clone(), available: names(available) })?;
+                .ok_or_else(|| format!("no column {wanted}; the file has {}", names(available)))
+                .map_err(SelectionError::Other)?;
             if let Some((_, other)) = assigned.iter().find(|(known, _)| *known == role) {
-                let (one, other) = (available[*other].name.clone(), wanted.clone());
-                return Err(SelectionError::Ambiguous { channel: name.clone(), one, other });
+                return Err(ambiguous(name, &available[*other].name, wanted));
             }
             assigned.push((role, position));
         }
@@ -315,20 +287,42 @@ impl ColumnSelection {
             Role::Channel(profile) => {
                 let own = column.unit.filter(|unit| unit.measures(profile.quantity) || unit.base == COUNT);
                 let own = own.or_else(|| stated(COUNT)).or_else(|| unit_by_interface(&column.name, profile.quantity));
-                let unit = stated(profile.quantity.unit()).or(own).ok_or_else(|| SelectionError::NoUnit {
-                    column: column.name.clone(),
-                    channel: profile.name.to_owned(),
-                    example: profile.quantity.unit(),
-                })?;
+                let (name, channel, example) = (&column.name, profile.name, profile.quantity.unit());
+                let none = || format!("column {name}: no unit of {channel}; give one, as in --units {example}");
+                let unit = stated(example).or(own).ok_or_else(|| SelectionError::Other(none()))?;
                 let is_known = profile != ChannelProfile::generic(profile.name, profile.quantity);
                 match unit.base {
                     COUNT if is_known => (Some(unit), profile.lsb),
-                    COUNT => return Err(SelectionError::CountsOfAny(column.name.clone())),
+                    COUNT => {
+                        let told = format!("column {name}: counts of which sensor? give its profile with --sensor");
+                        return Err(SelectionError::Other(told));
+                    }
                     _ => (Some(unit), unit.factor),
                 }
             }
         };
         Ok(ChosenColumn { position, role, label: column.name.clone(), unit, factor })
+    }
+}
+
+/// The recording as the user states it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    pub sensor: SensorProfile,
+    /// Columns and units.
+    pub selection: ColumnSelection,
+    pub topic: Option<String>,
+}
+
+impl ReadOptions {
+    /// Defaults for `sensor`.
+    #[must_use]
+    pub fn of_sensor(sensor: SensorProfile) -> Self {
+        Self { sensor, selection: ColumnSelection::default(), topic: None }
+    }
+
+    pub(crate) fn choose(&self, available: &[AvailableColumn]) -> Result<Vec<ChosenColumn>, SelectionError> {
+        self.selection.choose(available, &self.sensor)
     }
 }
 
@@ -491,8 +485,7 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
             if role == Role::Index {
                 continue;
             }
-            let (one, other) = (available[*other].name.clone(), column.name.clone());
-            return Err(SelectionError::Ambiguous { channel: role.name().to_owned(), one, other });
+            return Err(ambiguous(role.name(), &available[*other].name, &column.name));
         }
         named.push((role, position));
     }
@@ -505,7 +498,7 @@ fn rate_of_body(available: &[AvailableColumn], position: usize) -> Option<&'stat
     let letters = ["p", "q", "r"];
     let has_all = letters.iter().all(|letter| available.iter().any(|column| is_named(column, letter)));
     let axis = letters.iter().position(|letter| has_all && is_named(&available[position], letter))?;
-    Some(AXES[0].1[axis])
+    Some(AXES[0][axis])
 }
 
 enum NamedRole {
@@ -514,84 +507,15 @@ enum NamedRole {
     Channel(&'static str),
 }
 
-/// Usual names in small letters, `_` for other signs, without axis.
-const GYROSCOPE: [&str; 32] = [
-    "gyro",
-    "gy",
-    "gyr",
-    "gyros",
-    "gyroscope",
-    "gyro_rate",
-    "gyrorate",
-    "rot_rate",
-    "rotation_rate",
-    "rotationrate",
-    "angularvelocity",
-    "ang_vel",
-    "angvel",
-    "w",
-    "wb",
-    "g",
-    "omega",
-    "rate",
-    "angular_velocity",
-    "angular_rate",
-    "w_rs_s",
-    "gyro_rad",
-    "anglvel",
-    "angular_vel",
-    "angularvel",
-    "angularrate",
-    "ang_rate",
-    "angrate",
-    "rotrate",
-    "rotation",
-    "gyroadc",
-    "gyroscope_rate",
-];
-const ACCELEROMETER: [&str; 23] = [
-    "accl",
-    "ac",
-    "fb",
-    "acc",
-    "accel",
-    "accels",
-    "accelerometer",
-    "linearacceleration",
-    "lin_acc",
-    "linacc",
-    "a",
-    "acceleration",
-    "linear_acceleration",
-    "specific_force",
-    "a_rs_s",
-    "accelerometer_m_s2",
-    "force",
-    "accels",
-    "linear_accel",
-    "linearaccel",
-    "specificforce",
-    "accsmooth",
-    "accelerometer_acceleration",
-];
-const MAGNETOMETER: [&str; 11] = [
-    "magn",
-    "mag",
-    "magnetometer",
-    "m",
-    "mb",
-    "b",
-    "magnetic_field",
-    "magneticfield",
-    "mag_field",
-    "magfield",
-    "compass",
-];
-const AXES: [(&str, [&str; 3]); 3] = [
-    ("gyro", ["gyro_x", "gyro_y", "gyro_z"]),
-    ("accl", ["accl_x", "accl_y", "accl_z"]),
-    ("magn", ["magn_x", "magn_y", "magn_z"]),
-];
+/// Usual names in small letters, `_` for other signs, without axis, between blanks.
+const GYROSCOPE: &str = "gyro gy gyr gyros gyroscope gyro_rate gyrorate rot_rate rotation_rate rotationrate angularvelocity ang_vel \
+    angvel w wb g omega rate angular_velocity angular_rate w_rs_s gyro_rad anglvel angular_vel angularvel \
+    angularrate ang_rate angrate rotrate rotation gyroadc gyroscope_rate";
+const ACCELEROMETER: &str = "accl ac fb acc accel accels accelerometer linearacceleration lin_acc linacc a acceleration \
+    linear_acceleration specific_force a_rs_s accelerometer_m_s2 force linear_accel linearaccel specificforce \
+    accsmooth accelerometer_acceleration";
+const MAGNETOMETER: &str = "magn mag magnetometer m mb b magnetic_field magneticfield mag_field magfield compass";
+const AXES: [[&str; 3]; 3] = [columns::GYROSCOPE, columns::ACCELEROMETER, columns::MAGNETOMETER];
 
 /// True for the times of samples in a file with several.
 fn is_time_of_sample(name: &str) -> bool {
@@ -626,12 +550,12 @@ fn role_of(name: &str) -> Option<NamedRole> {
         "aux_adc" => return Some(NamedRole::Channel("aux_adc")),
         _ => {}
     }
-    let groups = [&GYROSCOPE[..], &ACCELEROMETER[..], &MAGNETOMETER[..]];
+    let groups = [GYROSCOPE, ACCELEROMETER, MAGNETOMETER];
     // An axis before the name: `xgyro`, `x_accel`.
     let before = plain.chars().next().and_then(|axis| "xyz".find(axis)).and_then(|axis| {
         let base = plain[1..].trim_start_matches('_');
-        let group = groups.iter().position(|group| base.len() > 2 && group.contains(&base))?;
-        Some(NamedRole::Channel(AXES[group].1[axis]))
+        let group = groups.iter().position(|group| base.len() > 2 && group.split(' ').any(|known| known == base))?;
+        Some(NamedRole::Channel(AXES[group][axis]))
     });
     if before.is_some() {
         return before;
@@ -640,8 +564,8 @@ fn role_of(name: &str) -> Option<NamedRole> {
     let base = plain[..plain.len() - 1].trim_end_matches('_');
     // A prefix: `imu0_gyro`, `field_angular_velocity`; not before single letters.
     let matches = |known: &str| base == known || known.len() > 2 && base.ends_with(&format!("_{known}"));
-    let group = groups.iter().position(|group| group.iter().any(|known| matches(known)))?;
-    Some(NamedRole::Channel(AXES[group].1[axis]))
+    let group = groups.iter().position(|group| group.split(' ').any(matches))?;
+    Some(NamedRole::Channel(AXES[group][axis]))
 }
 
 #[cfg(test)]

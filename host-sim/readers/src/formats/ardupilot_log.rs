@@ -1,13 +1,14 @@
 //! DataFlash logs of ArduPilot (`.bin`): IMU messages, and batches of raw samples (ISBH, ISBD). The crate
 //! `ardupilot-binlog` 0.2 panics at a stated length below 3.
 
-use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic, TopicSensor};
+use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
 use crate::input::budget::{Budget, Metered};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
+use crate::rows::whole_table::TopicSensor;
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, ErrorKind, Read};
 

@@ -1,43 +1,32 @@
 //! Named arrays of NumPy, MATLAB and HDF5, and the tables that they form.
 
-use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, known_by_name};
 use crate::columns::unit::Unit;
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic, TopicSensor};
+use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::formats::message_layout::Scalar;
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Stop, Topic};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
-use std::collections::{BTreeMap, HashSet};
+use crate::rows::whole_table::{MAX_SAMPLES, TopicSensor};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 
 /// Vectors without a stated unit, as in NaveGo and textbooks.
 const UNITS_BY_NAME: [(&str, &str); 2] = [("wb", "rad/s"), ("fb", "m/s^2")];
 
-/// Names of a sample rate, Hz: attributes, or arrays of one number.
-const RATES: [&str; 13] = [
-    "sampling_rate",
-    "sample_rate",
-    "samplingrate",
-    "samplerate",
-    "sampling_frequency",
-    "sample_frequency",
-    "samplefrequency",
-    "samplingfrequency",
-    "fs",
-    "freq",
-    "rate_hz",
-    "fs_hz",
-    "sample_rate_hz",
-];
+/// Names of a sample rate, Hz, between blanks: attributes, or arrays of one number.
+const RATES: &str = "sampling_rate sample_rate samplingrate samplerate sampling_frequency sample_frequency samplefrequency \
+    samplingfrequency fs freq rate_hz fs_hz sample_rate_hz";
 /// Names of a sample period, s.
-const PERIODS: [&str; 5] = ["dt", "ts", "sample_time", "sample_period", "sampling_period"];
+const PERIODS: &str = "dt ts sample_time sample_period sampling_period";
 
 /// The sample rate, Hz, that a number with this name states.
 pub(crate) fn stated_rate(name: &str, number: f64) -> Option<f64> {
     let name = name.to_lowercase();
-    let rate = if PERIODS.contains(&name.as_str()) { number.recip() } else { number };
-    let is_known = RATES.contains(&name.as_str()) || PERIODS.contains(&name.as_str());
-    (is_known && rate.is_finite() && rate > 0.0).then_some(rate)
+    let is_one_of = |known: &str| known.split(' ').any(|known| known == name);
+    let rate = if is_one_of(PERIODS) { number.recip() } else { number };
+    ((is_one_of(RATES) || is_one_of(PERIODS)) && rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
 /// A vector, or a matrix whose longer side is time.
@@ -89,23 +78,64 @@ impl NamedArray {
     }
 }
 
-pub(crate) type EachArrayRow<'a> = dyn FnMut(Result<&[Number], Reason>) -> Result<(), InputError> + 'a;
+/// Numbers of a column in rows of bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Encoded {
+    pub(crate) offset: usize,
+    pub(crate) scalar: Scalar,
+    pub(crate) is_big_endian: bool,
+}
+
+impl Encoded {
+    /// NaN beyond the end of `row`.
+    pub(crate) fn number(self, row: &[u8]) -> Number {
+        self.scalar.read(row.get(self.offset..).unwrap_or_default(), self.is_big_endian)
+    }
+}
+
+/// Columns that are read: array and number, of arrays of `rows` rows.
+pub(crate) struct WantedColumns<'a> {
+    pub(crate) places: &'a [(usize, usize)],
+    rows: usize,
+    budget: Budget,
+}
+
+impl WantedColumns<'_> {
+    /// For a format whose columns have to be held, an array at a time.
+    pub(crate) fn held(
+        &self,
+        each: &mut EachRow,
+        mut read: impl FnMut(usize, &[usize]) -> Result<Vec<Vec<Number>>, Reason>,
+    ) -> Result<(), Stop> {
+        if self.rows as u64 > MAX_SAMPLES {
+            return Err(Reason::TooManySamples.into());
+        }
+        self.budget.meter().add_values((self.rows * self.places.len()) as u64)?;
+        let mut columns: Vec<Vec<Number>> = vec![Vec::new(); self.places.len()];
+        let arrays: BTreeSet<usize> = self.places.iter().map(|(array, _)| *array).collect();
+        for array in arrays {
+            let own: Vec<usize> = (0..columns.len()).filter(|&at| self.places[at].0 == array).collect();
+            let numbers: Vec<usize> = own.iter().map(|&at| self.places[at].1).collect();
+            for (at, column) in own.into_iter().zip(read(array, &numbers)?) {
+                columns[at] = column;
+            }
+        }
+        let rows = columns.iter().map(Vec::len).min().unwrap_or(0);
+        let mut row = Vec::with_capacity(columns.len());
+        for at in 0..rows {
+            row.clear();
+            row.extend(columns.iter().map(|column| column[at]));
+            each(&row)?;
+        }
+        Ok(())
+    }
+}
 
 pub(crate) trait ArrayReader: Send {
     const FORMAT: &'static str;
 
-    /// Columns of an array; `add` gets the count of numbers to be held.
-    fn read(
-        &mut self,
-        array: usize,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason>;
-
-    /// Streams the rows of columns (array, number); `None` if the format has to hold them.
-    fn for_each_row(&mut self, _places: &[(usize, usize)], _each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
-        None
-    }
+    /// Calls `each` with the rows of the columns.
+    fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop>;
 }
 
 pub(crate) struct ArraySource<'a, R> {
@@ -122,7 +152,7 @@ pub(crate) struct ArraySource<'a, R> {
 impl<'a, R: ArrayReader> ArraySource<'a, R> {
     /// The first topic has all arrays; groups and arrays follow.
     pub(crate) fn new(file: &'a Path, mut reader: R, mut arrays: Vec<NamedArray>, budget: Budget) -> Self {
-        set_stated_rates(&mut reader, &mut arrays);
+        set_stated_rates(&mut reader, &mut arrays, budget);
         let places: Vec<(usize, usize)> = arrays
             .iter()
             .enumerate()
@@ -218,15 +248,22 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
     }
 }
 
-fn set_stated_rates(reader: &mut impl ArrayReader, arrays: &mut [NamedArray]) {
+fn set_stated_rates(reader: &mut impl ArrayReader, arrays: &mut [NamedArray], budget: Budget) {
     for at in 0..arrays.len() {
         let NamedArray { group, name, rows: 1, columns, .. } = &arrays[at] else { continue };
         // 1 stands for any.
         if columns.len() != 1 || stated_rate(name, 1.0).is_none() {
             continue;
         }
-        let Ok(read) = reader.read(at, &[0], &mut |_| Ok(())) else { continue };
-        let number = read.first().and_then(|values| values.first()).map_or(f64::NAN, |number| number.value());
+        let mut number = f64::NAN;
+        let wanted = WantedColumns { places: &[(at, 0)], rows: 1, budget };
+        let mut take = |row: &[Number]| {
+            number = row[0].value();
+            Ok(())
+        };
+        if reader.rows(&wanted, &mut take).is_err() {
+            continue;
+        }
         let Some(rate) = stated_rate(name, number) else { continue };
         let (group, path) = (group.clone(), arrays[at].path());
         for array in arrays.iter_mut().filter(|array| array.rows > 1 && array.group.starts_with(&group)) {
@@ -286,30 +323,7 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
                 [&self.arrays[first], array].map(|array| format!("array {:?} has {} rows", array.path(), array.rows));
             return Err(fail(Reason::UnequalRows(format!("{one}, {other}"))));
         }
-        let mut each_row = |row: Result<&[Number], Reason>| each(row.map_err(fail)?);
-        if let Some(streamed) = self.reader.for_each_row(&places, &mut each_row) {
-            return streamed.map(|()| Ending { damage: None, notes });
-        }
-        let mut values: Vec<Vec<Number>> = vec![Vec::new(); places.len()];
-        let mut meter = self.budget.meter();
-        for number in 0..self.arrays.len() {
-            let own: Vec<usize> = (0..places.len()).filter(|&at| places[at].0 == number).collect();
-            if own.is_empty() {
-                continue;
-            }
-            let columns: Vec<usize> = own.iter().map(|&at| places[at].1).collect();
-            let read = self.reader.read(number, &columns, &mut |values| meter.add_values(values)).map_err(fail)?;
-            for (at, column) in own.into_iter().zip(read) {
-                values[at] = column;
-            }
-        }
-        let rows = values.iter().map(Vec::len).min().unwrap_or(0);
-        let mut row = Vec::with_capacity(values.len());
-        for at in 0..rows {
-            row.clear();
-            row.extend(values.iter().map(|column| column[at]));
-            each(&row)?;
-        }
-        Ok(Ending { damage: None, notes })
+        let wanted = WantedColumns { places: &places, rows: self.arrays[first].rows, budget: self.budget };
+        Ok(Ending { damage: Stop::damage(self.reader.rows(&wanted, each))?, notes })
     }
 }

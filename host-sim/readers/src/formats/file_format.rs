@@ -1,6 +1,6 @@
 //! Recognition of a format by content, and reading.
 
-use crate::columns::column_selection::ColumnSelection;
+use crate::columns::column_selection::{ColumnSelection, ReadOptions};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
 #[cfg(feature = "hdf5")]
 use crate::formats::hdf5::Hdf5Reader;
@@ -13,9 +13,9 @@ use crate::formats::split_bag::SplitBag;
 pub use crate::formats::split_bag::files_of_bag;
 #[cfg(feature = "sqlite")]
 use crate::formats::sqlite_bag::SqliteSource;
-use crate::formats::text_table::TextRows;
+use crate::formats::text_table::TextTable;
 pub use crate::formats::topics::TopicDescription;
-use crate::formats::topics::{self, Source, TopicRows};
+use crate::formats::topics::{self, FileLimits, Source, TopicRows};
 use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
 use crate::input::budget::{Budget, Metered};
@@ -27,7 +27,6 @@ use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
 use crate::inspection::InspectedTable;
-use crate::rows::any_sensor::ReadOptions;
 use crate::rows::batch::RegisterField;
 use crate::rows::row_source::{FileRows, RowSource};
 use crate::rows::whole_table::WholeTable;
@@ -138,7 +137,7 @@ impl InputFile {
         if metadata.is_dir() {
             let files = files_of_bag(name).map_err(fail)?;
             let bytes: Vec<FileBytes> = files.iter().map(FileBytes::from).collect();
-            if bytes.is_empty() { Err(InputError::file(name, Reason::Directory)) } else { Ok(bytes) }
+            if bytes.is_empty() { Err(InputError::file(name, no_bag())) } else { Ok(bytes) }
         } else if metadata.is_file() {
             Ok(vec![FileBytes::from(name)])
         } else {
@@ -178,11 +177,11 @@ impl InputFile {
         for file in files {
             let (part, of_part) = InputPart::recognised(file)?;
             if *format.get_or_insert(of_part) != of_part {
-                return Err(InputError::file(name, Reason::Directory));
+                return Err(InputError::file(name, no_bag()));
             }
             parts.push(part);
         }
-        let format = format.ok_or_else(|| InputError::file(name, Reason::Directory))?;
+        let format = format.ok_or_else(|| InputError::file(name, no_bag()))?;
         let budget = Budget::joined(parts.iter().map(|part| part.budget));
         Ok(Self { name: name.to_owned(), parts, arrays: None, format, monitor: monitor.clone(), budget })
     }
@@ -231,7 +230,8 @@ impl InputFile {
     /// It is no text, or there is none.
     pub fn first_line(&self) -> Result<String, InputError> {
         let mut lines = Lines::open(self.bytes())?;
-        lines.header()?.map(str::to_owned).ok_or_else(|| self.bytes().error(Reason::Empty))
+        let header = lines.header()?.map(str::to_owned);
+        header.ok_or_else(|| self.bytes().error(lines.take_damage().unwrap_or(Reason::Empty)))
     }
 
     /// Rows of a table or topic; `register` gives the register of a channel of words, by name.
@@ -245,8 +245,8 @@ impl InputFile {
     ) -> Result<FileRows<'_>, InputError> {
         let (name, bytes) = (self.name(), self.bytes());
         let rows: Box<dyn RowSource + '_> = match self.format {
-            FileFormat::TextTable => Box::new(TextRows::open(bytes, options, &self.monitor)?),
-            _ => Box::new(TopicRows::open(name, self.source()?, options, self.budget)?),
+            FileFormat::TextTable => Box::new(TextTable::open(bytes, options, &self.monitor)?),
+            _ => Box::new(TopicRows::open(name, self.source()?, options, self.limits())?),
         };
         Ok(FileRows::new(name, rows, &self.monitor, register))
     }
@@ -274,7 +274,7 @@ impl InputFile {
                     table => table.map(|table| vec![table]),
                 }
             }
-            _ => self.source().and_then(|source| topics::read_whole(name, source, topic, self.budget)),
+            _ => self.source().and_then(|source| topics::read_whole(name, source, topic, self.limits())),
         };
         let inspect = |table: WholeTable| {
             let names: Vec<&str> = table.columns.iter().map(|of| of.column.name.as_str()).collect();
@@ -308,6 +308,10 @@ impl InputFile {
         Ok(source.topics().iter().map(TopicDescription::from).collect())
     }
 
+    fn limits(&self) -> FileLimits {
+        FileLimits { budget: self.budget, cut: self.parts.iter().find_map(|part| part.bytes.cut()) }
+    }
+
     fn source(&self) -> Result<Box<dyn Source + '_>, InputError> {
         if let Some(arrays) = &self.arrays {
             return Ok(Box::new(arrays.source(&self.name, self.budget)?));
@@ -337,7 +341,10 @@ impl InputFile {
             #[cfg(feature = "hdf5")]
             FileFormat::Hdf5 => Box::new(Hdf5Reader::open(bytes, budget)?),
             #[cfg(not(all(feature = "hdf5", feature = "sqlite")))]
-            format => return Err(bytes.error(Reason::NotBuilt(format.name()))),
+            format => {
+                let what = "which this program was built without; build it with the features hdf5 and sqlite";
+                return Err(bytes.error(Reason::other(format!("{}, {what}", format.name()))));
+            }
         })
     }
 }
@@ -347,8 +354,8 @@ impl InputPart {
         let fail = |error| origin.error(Reason::Io(error));
         let refuse = |reason| Err(origin.error(reason));
         let budget = Budget::of_file(&origin).map_err(fail)?;
-        let expanded = |whole: &mut dyn Read| {
-            FileBytes::copied(origin.name(), Metered::new(whole, budget.meter()))
+        let expanded = |whole: &mut dyn Read, compression| {
+            FileBytes::copied(origin.name(), Metered::new(whole, budget.meter()), compression)
                 .map_err(|error| origin.error(Reason::from_io(error)))
         };
         let mut bytes = origin.clone();
@@ -361,14 +368,14 @@ impl InputPart {
             // Reported with its line later.
             let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
             if binary_format(&start).is_some() {
-                bytes = expanded(&mut start.as_slice().chain(inner))?;
+                bytes = expanded(&mut start.as_slice().chain(inner), "gzip")?;
                 head = start;
             } else {
                 text = Some(start);
             }
         }
         if head.starts_with(&ZSTD_MAGIC) {
-            bytes = expanded(&mut ZstdFrames::new(BufReader::new(bytes.open().map_err(fail)?)))?;
+            bytes = expanded(&mut ZstdFrames::new(BufReader::new(bytes.open().map_err(fail)?)), "Zstandard data")?;
             head = bytes.head(HEAD_BYTES).map_err(fail)?;
         }
         let format = match binary_format(&head) {
@@ -384,6 +391,10 @@ impl InputPart {
         };
         Ok((Self { origin, bytes, budget }, format))
     }
+}
+
+fn no_bag() -> Reason {
+    Reason::other("is a directory, not a file, and not that of one bag of ROS 2 in .mcap or .db3 files")
 }
 
 /// Interval of looking for a stop.

@@ -91,7 +91,11 @@ pub(crate) fn refusal(head: &[u8]) -> Reason {
             what: "a telemetry log of MAVLink",
             how: "with pymavlink: mavlogdump.py --types RAW_IMU --format csv FILE > FILE.csv (or HIGHRES_IMU, SCALED_IMU)",
         },
-        None => Reason::UnknownBinary { begins: shown(head) },
+        None => {
+            let known = "known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog and DataFlash logs";
+            let how = "write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)";
+            Reason::other(format!("of no known format: it begins with {}; {known}; {how}", shown(head)))
+        }
     }
 }
 

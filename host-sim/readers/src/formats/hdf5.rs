@@ -1,13 +1,13 @@
 //! Datasets of HDF5 (MATLAB 7.3, `h5py`): matrices and tables of records, by path, in windows of rows.
 
 use crate::columns::unit::Unit;
-use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};
+use crate::formats::array_topics::{ArrayReader, ArraySource, Encoded, NamedArray, WantedColumns, stated_rate};
 use crate::formats::message_layout::Scalar;
+use crate::formats::topics::{EachRow, Stop};
 use crate::input::budget::{Budget, Meter};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
-use crate::rows::whole_table::MAX_SAMPLES;
 use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
 use std::collections::HashMap;
 use std::io::Read;
@@ -25,13 +25,6 @@ const OFFSET: &str = "add_offset";
 /// Class of an array in MATLAB.
 const MATLAB_CLASS: &str = "MATLAB_class";
 const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
-
-#[derive(Debug, Clone, Copy)]
-struct Encoded {
-    offset: usize,
-    scalar: Scalar,
-    is_big_endian: bool,
-}
 
 struct Layout {
     path: String,
@@ -78,7 +71,7 @@ impl Hdf5Reader {
 }
 
 fn damaged(error: impl ToString) -> Reason {
-    Reason::Format { format: FORMAT, error: error.to_string().into() }
+    Reason::damaged(FORMAT, error.to_string())
 }
 
 struct Found {
@@ -112,7 +105,7 @@ impl Found {
     fn count(&mut self) -> Result<(), Reason> {
         self.objects += 1;
         let most = MAX_OBJECTS;
-        if self.objects > most { Err(Reason::Array(format!("more than {most} datasets"))) } else { Ok(()) }
+        if self.objects > most { Err(Reason::other(format!("more than {most} datasets"))) } else { Ok(()) }
     }
 
     fn add(&mut self, dataset: &Dataset, group: &str, name: &str, around: &Stated) {
@@ -158,42 +151,14 @@ impl Stated {
 }
 
 fn number(value: &AttrValue) -> Option<f64> {
-    match value {
-        AttrValue::F32(value) => Some(f64::from(*value)),
-        AttrValue::F64(value) => Some(*value),
-        AttrValue::I8(value) => Some(f64::from(*value)),
-        AttrValue::I16(value) => Some(f64::from(*value)),
-        AttrValue::I32(value) => Some(f64::from(*value)),
-        AttrValue::I64(value) => Some(*value as f64),
-        AttrValue::U8(value) => Some(f64::from(*value)),
-        AttrValue::U16(value) => Some(f64::from(*value)),
-        AttrValue::U32(value) => Some(f64::from(*value)),
-        AttrValue::U64(value) => Some(*value as f64),
-        AttrValue::F32Array(values) => values.first().map(|value| f64::from(*value)).filter(|_| values.len() == 1),
-        AttrValue::F64Array(values) => values.first().copied().filter(|_| values.len() == 1),
-        AttrValue::I32Array(values) => values.first().map(|value| f64::from(*value)).filter(|_| values.len() == 1),
-        AttrValue::I64Array(values) => values.first().map(|value| *value as f64).filter(|_| values.len() == 1),
-        _ => text(value)?.trim().parse().ok(),
-    }
+    let whole = || value.as_i64().map(|number| number as f64).or_else(|| value.as_u64().map(|number| number as f64));
+    value.as_f64().or_else(whole).or_else(|| text(value)?.trim().parse().ok())
 }
 
 fn text(value: &AttrValue) -> Option<String> {
-    match value {
-        AttrValue::String(text)
-        | AttrValue::AsciiString(text)
-        | AttrValue::VarLenString(text)
-        | AttrValue::VarLenAsciiString(text)
-        | AttrValue::StringSized { value: text, .. }
-        | AttrValue::AsciiStringSized { value: text, .. } => Some(text.trim_end_matches('\0').to_owned()),
-        AttrValue::StringArray(texts)
-        | AttrValue::AsciiStringArray(texts)
-        | AttrValue::VarLenStringArray(texts)
-        | AttrValue::VarLenAsciiStringArray(texts) => {
-            let first = texts.first()?;
-            texts.iter().all(|text| text == first).then(|| first.clone())
-        }
-        _ => None,
-    }
+    let texts = value.as_strings()?;
+    let first = texts.first().filter(|first| texts.iter().all(|text| text == *first))?;
+    Some(first.trim_end_matches('\0').to_owned())
 }
 
 /// `None` unless vector, matrix or table of numbers.
@@ -278,39 +243,22 @@ fn encoded(kind: &Datatype, offset: usize) -> Option<Encoded> {
     Some(Encoded { offset, scalar, is_big_endian })
 }
 
-impl Encoded {
-    /// NaN beyond the end.
-    fn number(self, row: &[u8]) -> Number {
-        let size = self.scalar.bytes();
-        let Some(own) = row.get(self.offset..self.offset + size) else { return Number::Real(f64::NAN) };
-        let mut word = [0; 8];
-        word[..size].copy_from_slice(own);
-        if self.is_big_endian {
-            word[..size].reverse();
-        }
-        self.scalar.number(u64::from_le_bytes(word))
-    }
-}
-
 impl ArrayReader for Hdf5Reader {
     const FORMAT: &'static str = FORMAT;
 
-    fn read(
-        &mut self,
-        array: usize,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
+    fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop> {
+        wanted.held(each, |array, columns| self.read(array, columns))
+    }
+}
+
+impl Hdf5Reader {
+    fn read(&mut self, array: usize, columns: &[usize]) -> Result<Vec<Vec<Number>>, Reason> {
         let Layout { path, rows, columns: encoded, stride, is_by_column, scale } = &self.layouts[array];
         let number = |column: usize, bytes: &[u8]| {
             let number = encoded[column].number(bytes);
             scale.map_or(number, |[factor, offset]| Number::Real(factor * number.value() + offset))
         };
-        if *rows as u64 > MAX_SAMPLES {
-            return Err(Reason::TooManySamples);
-        }
         let (rows, stride) = (*rows as u64, *stride as u64);
-        add(rows * columns.len() as u64)?;
         let dataset = self.file.dataset(path).map_err(damaged)?;
         let mut values: Vec<Vec<Number>> = vec![Vec::new(); columns.len()];
         if *is_by_column {

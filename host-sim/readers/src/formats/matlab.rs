@@ -1,12 +1,12 @@
 //! MATLAB `.mat` files of level 5, with structures and cells (MAT-File Format, chapter 1). `matfile` has no structures.
 
-use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
+use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, WantedColumns};
 use crate::formats::message_layout::Scalar;
+use crate::formats::topics::{EachRow, Stop};
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
-use crate::rows::whole_table::MAX_SAMPLES;
 use flate2::read::ZlibDecoder;
 use std::io::{self, BufReader, Read};
 
@@ -100,7 +100,7 @@ impl MatReader {
             } else {
                 OTHER_COMMANDS.to_owned()
             };
-            return Err(fail(Reason::Array(format!(
+            return Err(fail(Reason::other(format!(
                 "it holds a MATLAB object ({name}, a {class}), which is not read; in MATLAB: {how}"
             ))));
         }
@@ -117,22 +117,14 @@ impl MatReader {
 impl ArrayReader for MatReader {
     const FORMAT: &'static str = FORMAT;
 
-    fn read(
-        &mut self,
-        array: usize,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
-        let rows = self.arrays[array].shape()[0] as u64;
-        if rows > MAX_SAMPLES {
-            return Err(Reason::TooManySamples);
-        }
-        add(rows * columns.len() as u64)?;
-        let mut walk = Walk::new(self.budget);
-        walk.values = vec![Vec::new(); columns.len()];
-        walk.wanted = Some((self.arrays[array].parts, columns));
-        walk.file(&self.file)?;
-        if walk.is_done() { Ok(walk.values) } else { Err(Reason::Truncated { format: FORMAT }) }
+    fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop> {
+        wanted.held(each, |array, columns| {
+            let mut walk = Walk::new(self.budget);
+            walk.values = vec![Vec::new(); columns.len()];
+            walk.wanted = Some((self.arrays[array].parts, columns));
+            walk.file(&self.file)?;
+            if walk.is_done() { Ok(walk.values) } else { Err(Reason::Truncated { format: FORMAT }) }
+        })
     }
 }
 
@@ -202,7 +194,7 @@ impl Walk<'_> {
             }
             io::copy(&mut input.by_ref().take(padding), &mut io::sink()).map_err(ended)?;
             if self.arrays.len() > MAX_ARRAYS {
-                return Err(Reason::Array(format!("more than {MAX_ARRAYS} arrays")));
+                return Err(Reason::other(format!("more than {MAX_ARRAYS} arrays")));
             }
         }
         Ok(())
@@ -213,7 +205,7 @@ impl Walk<'_> {
         self.arrays.push(ListedArray { group, name, sides, parts });
         self.walked += 1;
         let most = MAX_PARTS;
-        if self.walked > most { Err(Reason::Array(format!("more than {most} arrays"))) } else { Ok(()) }
+        if self.walked > most { Err(Reason::other(format!("more than {most} arrays"))) } else { Ok(()) }
     }
 
     /// Joins the arrays of `count` structures with a sample each; drops those of too many structures.
@@ -325,7 +317,7 @@ impl Walk<'_> {
         let length = self.small(input, 4)?.first().map_or(0, |length| *length as usize);
         let tag = Tag::read(input, self.is_big_endian)?;
         if length == 0 || u64::from(tag.length) > (MAX_CHILDREN * length) as u64 || length as u64 > MAX_NAME {
-            return Err(Reason::Format { format: FORMAT, error: "names of fields are too long".into() });
+            return Err(Reason::damaged(FORMAT, "names of fields are too long"));
         }
         let names = self.content(input, tag)?;
         let name = |bytes: &[u8]| {
@@ -339,7 +331,7 @@ impl Walk<'_> {
     fn small(&mut self, input: &mut Counted, most: u64) -> Result<Vec<u32>, Reason> {
         let tag = Tag::read(input, self.is_big_endian)?;
         if u64::from(tag.length) > most {
-            return Err(Reason::Format { format: FORMAT, error: "an array has too many dimensions".into() });
+            return Err(Reason::damaged(FORMAT, "an array has too many dimensions"));
         }
         let bytes = self.content(input, tag)?;
         Ok(bytes.chunks_exact(4).map(|word| number(word, self.is_big_endian) as u32).collect())
@@ -348,7 +340,7 @@ impl Walk<'_> {
     fn text(&mut self, input: &mut Counted) -> Result<String, Reason> {
         let tag = Tag::read(input, self.is_big_endian)?;
         if u64::from(tag.length) > MAX_NAME {
-            return Err(Reason::Format { format: FORMAT, error: "the name of an array is too long".into() });
+            return Err(Reason::damaged(FORMAT, "the name of an array is too long"));
         }
         Ok(String::from_utf8_lossy(&self.content(input, tag)?).into_owned())
     }
@@ -365,7 +357,6 @@ impl Walk<'_> {
 
     fn numbers(&mut self, input: &mut Counted, [rows, columns]: [usize; 2]) -> Result<(), Reason> {
         let tag = Tag::read(input, self.is_big_endian)?;
-        let unknown = || Reason::Format { format: FORMAT, error: "an array has numbers of an unknown type".into() };
         let scalar = match tag.kind {
             1 => Scalar::Signed(1),
             2 => Scalar::Unsigned(1),
@@ -377,7 +368,7 @@ impl Walk<'_> {
             9 => Scalar::Float(8),
             12 => Scalar::Signed(8),
             13 => Scalar::Unsigned(8),
-            _ => return Err(unknown()),
+            _ => return Err(Reason::damaged(FORMAT, "an array has numbers of an unknown type")),
         };
         match tag.held {
             Some(held) => {
@@ -408,7 +399,7 @@ impl Walk<'_> {
                 };
                 at += 1;
                 for (values, _) in self.values.iter_mut().zip(wanted).filter(|(_, wanted)| **wanted == column) {
-                    values.push(scalar.number(number(word, is_big_endian)));
+                    values.push(scalar.read(word, is_big_endian));
                 }
             }
         };
@@ -436,11 +427,8 @@ fn number(bytes: &[u8], is_big_endian: bool) -> u64 {
 
 fn ended(error: io::Error) -> Reason {
     match error.kind() {
-        io::ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },
-        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => {
-            Reason::Format { format: FORMAT, error: error.to_string().into() }
-        }
-        _ => Reason::from_io(error),
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => Reason::damaged(FORMAT, error.to_string()),
+        _ => Reason::ended(FORMAT, error),
     }
 }
 
@@ -464,7 +452,7 @@ impl Tag {
                 let [.., a, b, c, d] = bytes;
                 Ok(Self { kind: kind & 0xFFFF, length: small, held: Some([a, b, c, d]) })
             }
-            _ => Err(Reason::Format { format: FORMAT, error: "an element is longer than its tag".into() }),
+            _ => Err(Reason::damaged(FORMAT, "an element is longer than its tag")),
         }
     }
 

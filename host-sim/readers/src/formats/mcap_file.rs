@@ -1,5 +1,6 @@
 //! Records of MCAP in the memory of one chunk. The crate `mcap` needs a C compiler.
 
+use crate::formats::topics::Stop;
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
@@ -127,7 +128,7 @@ impl<'a> Fields<'a> {
 }
 
 fn damaged(error: &str) -> Reason {
-    Reason::Format { format: FORMAT, error: error.to_owned().into() }
+    Reason::damaged(FORMAT, error)
 }
 
 fn cut_off() -> Reason {
@@ -140,18 +141,6 @@ fn type_and_length(header: [u8; HEADER_BYTES]) -> Result<(u8, usize), Reason> {
     Ok((opcode, length.ok_or_else(|| damaged("a record is longer than 268435456 bytes"))?))
 }
 
-/// Damage, or a refusal by `each`.
-enum Stop {
-    Damage(Reason),
-    Refusal(InputError),
-}
-
-impl From<Reason> for Stop {
-    fn from(reason: Reason) -> Self {
-        Self::Damage(reason)
-    }
-}
-
 type EachRecord<'a> = dyn FnMut(McapRecord) -> Result<(), InputError> + 'a;
 
 /// With the reason of an early end.
@@ -160,11 +149,7 @@ pub(crate) fn for_each_record(
     budget: Budget,
     mut each: impl FnMut(McapRecord) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
-    match read(file, &mut budget.meter(), &mut each) {
-        Ok(()) => Ok(None),
-        Err(Stop::Damage(reason)) => Ok(Some(reason)),
-        Err(Stop::Refusal(error)) => Err(error),
-    }
+    Stop::damage(read(file, &mut budget.meter(), &mut each))
 }
 
 /// Records of the final summary; false without one, as after an interruption.
@@ -224,7 +209,7 @@ fn read(file: &FileBytes, meter: &mut Meter, each: &mut EachRecord) -> Result<()
 }
 
 fn give(opcode: u8, data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
-    McapRecord::decode(opcode, data)?.map_or(Ok(()), |record| each(record).map_err(Stop::Refusal))
+    Ok(McapRecord::decode(opcode, data)?.map_or(Ok(()), each)?)
 }
 
 /// `unpacked` is a buffer.

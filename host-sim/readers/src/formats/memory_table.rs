@@ -1,7 +1,8 @@
 //! Arrays in memory, as of NumPy or Arrow.
 
 use crate::columns::unit::Unit;
-use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
+use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, WantedColumns};
+use crate::formats::topics::{EachRow, Stop};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
@@ -61,25 +62,9 @@ impl MemoryTable {
 impl ArrayReader for &MemoryTable {
     const FORMAT: &'static str = "arrays";
 
-    fn read(
-        &mut self,
-        array: usize,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
-        let read = |&column: &usize| {
-            let column = &self.arrays[array].columns[column];
-            add(column.rows() as u64)?;
-            let mut numbers = vec![Number::Integer(0); column.rows()];
-            column.read(0, &mut numbers);
-            Ok(numbers)
-        };
-        columns.iter().map(read).collect()
-    }
-
-    fn for_each_row(&mut self, places: &[(usize, usize)], each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
+    fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop> {
         let columns: Vec<&Arc<dyn MemoryColumn>> =
-            places.iter().map(|&(array, column)| &self.arrays[array].columns[column]).collect();
+            wanted.places.iter().map(|&(array, column)| &self.arrays[array].columns[column]).collect();
         let rows = columns.iter().map(|column| column.rows()).min().unwrap_or(0);
         let mut buffers = vec![vec![Number::Integer(0); ROWS_AT_ONCE]; columns.len()];
         let mut row = Vec::with_capacity(columns.len());
@@ -89,21 +74,19 @@ impl ArrayReader for &MemoryTable {
             for at in 0..count {
                 row.clear();
                 row.extend(buffers.iter().map(|buffer| buffer[at]));
-                if let Err(error) = each(Ok(&row)) {
-                    return Some(Err(error));
-                }
+                each(&row)?;
             }
         }
-        Some(Ok(()))
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{MemoryArray, MemoryColumn, MemoryTable, ROWS_AT_ONCE};
+    use crate::columns::column_selection::ReadOptions;
     use crate::formats::file_format::InputFile;
     use crate::input::read_monitor::ReadMonitor;
-    use crate::rows::any_sensor::ReadOptions;
     use crate::rows::batch::Number;
     use crate::rows::row_source::WantedRows;
     use measurement::SensorProfile;

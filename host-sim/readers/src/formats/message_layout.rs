@@ -29,6 +29,21 @@ impl Scalar {
         usize::from(bytes)
     }
 
+    /// At the start of `bytes`; NaN if they are too few.
+    pub(crate) fn read(self, bytes: &[u8], is_big_endian: bool) -> Number {
+        let size = self.bytes();
+        let Some(own) = bytes.get(..size) else { return Number::Real(f64::NAN) };
+        let mut word = [0; 8];
+        match <[u8; 8]>::try_from(own) {
+            Ok(whole) => word = whole,
+            Err(_) => word[..size].copy_from_slice(own),
+        }
+        if is_big_endian {
+            word[..size].reverse();
+        }
+        self.number(u64::from_le_bytes(word))
+    }
+
     /// Uses [`bytes`](Self::bytes) of `word`.
     pub(crate) fn number(self, word: u64) -> Number {
         let unused = 64 - 8 * self.bytes() as u32;
@@ -181,7 +196,7 @@ impl Builder<'_> {
         Budget::check_depth(level)?;
         let definitions = self.definitions;
         let Some(fields) = definitions.get(name) else {
-            return Err(Reason::Array(format!("no definition of {name:?} in the file")));
+            return Err(Reason::other(format!("no definition of {name:?} in the file")));
         };
         let mut steps = Vec::new();
         for field in fields {
@@ -245,7 +260,7 @@ impl Builder<'_> {
     fn count(&mut self) -> Result<(), Reason> {
         self.steps += 1;
         let most = MOST_STEPS;
-        let too_many = || Reason::Array(format!("a message is defined to have more than {most} fields"));
+        let too_many = || Reason::other(format!("a message is defined to have more than {most} fields"));
         if self.steps > most { Err(too_many()) } else { Ok(()) }
     }
 }

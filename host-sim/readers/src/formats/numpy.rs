@@ -1,18 +1,18 @@
 //! Arrays of NumPy: `.npy` and `.npz`.
 
 use crate::columns::unit::Unit;
-use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
-use crate::formats::message_layout::Scalar;
+use crate::formats::array_topics::{ArrayReader, ArraySource, Encoded, NamedArray, WantedColumns};
 use crate::formats::numpy_header::{ElementType, Encoding, Header};
+use crate::formats::topics::{EachRow, Stop};
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::rows::batch::Number;
-use crate::rows::whole_table::MAX_SAMPLES;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use zip::ZipArchive;
 
+const FORMAT: &str = "NumPy array";
 const MAX_COLUMNS: u64 = 1024;
 const OBJECTS: &str = "holds Python objects, which are not read; of a dict of arrays, in Python: \
                        numpy.savez(\"FILE.npz\", **numpy.load(\"FILE\", allow_pickle=True).item())";
@@ -41,65 +41,48 @@ impl NpyReader {
         Ok(ArraySource::new(file.name(), Self { input, layout, start }, arrays, budget))
     }
 
-    /// Rows from `first` on, of `columns` or whole.
-    fn fill(&mut self, first: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
+    /// Up to `rows` rows from `first` on, of `columns` or whole; as many as there are.
+    fn fill(&mut self, first: usize, rows: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
         let Self { layout, input, start } = self;
-        let rows = ROWS_AT_ONCE.min(layout.rows - first);
+        let mut whole = rows;
         for (buffer, column) in buffers.iter_mut().zip(columns) {
             let before = if layout.by_column { column * layout.rows + first } else { first };
             input.seek(SeekFrom::Start(*start + (before * layout.stride) as u64)).map_err(Reason::Io)?;
-            buffer.resize(rows * layout.stride, 0);
-            input.read_exact(buffer).map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
-                _ => Reason::Io(error),
-            })?;
+            buffer.clear();
+            input.by_ref().take((rows * layout.stride) as u64).read_to_end(buffer).map_err(Reason::from_io)?;
+            whole = whole.min(buffer.len() / layout.stride);
         }
-        Ok(rows)
+        Ok(whole)
     }
 }
 
 impl ArrayReader for NpyReader {
-    const FORMAT: &'static str = "NumPy array";
+    const FORMAT: &'static str = FORMAT;
 
-    fn read(
-        &mut self,
-        _array: usize,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
-        self.input.seek(SeekFrom::Start(self.start)).map_err(Reason::Io)?;
-        self.layout.columns(&mut self.input, columns, add)
-    }
-
-    fn for_each_row(&mut self, places: &[(usize, usize)], each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
-        let columns: Vec<usize> = places.iter().map(|(_, column)| *column).collect();
+    fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop> {
+        let columns: Vec<usize> = wanted.places.iter().map(|(_, column)| *column).collect();
         let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
-        // Buffer, offset, encoding per column.
-        let place = |(number, &column): (usize, &usize)| {
-            let FieldLayout { offset, encoding, .. } = &self.layout.fields[column];
-            if self.layout.by_column { (number, 0, encoding.clone()) } else { (0, *offset, encoding.clone()) }
-        };
-        let places: Vec<(usize, usize, Encoding)> = columns.iter().enumerate().map(place).collect();
+        // Of each column: its buffer.
+        let last = buffers.len() - 1;
+        let encoded: Vec<(usize, Encoded)> =
+            columns.iter().enumerate().map(|(at, &column)| (at.min(last), self.layout.columns[column].1)).collect();
         let mut row = Vec::with_capacity(columns.len());
         let mut first = 0;
         while first < self.layout.rows {
-            let rows = match self.fill(first, &columns, &mut buffers) {
-                Ok(rows) => rows,
-                Err(reason) => return Some(each(Err(reason))),
-            };
+            let expected = ROWS_AT_ONCE.min(self.layout.rows - first);
+            let rows = self.fill(first, expected, &columns, &mut buffers)?;
             for at in 0..rows {
-                row.clear();
                 let start = at * self.layout.stride;
-                row.extend(
-                    places.iter().map(|(of, offset, encoding)| decode(encoding, &buffers[*of][start + offset..])),
-                );
-                if let Err(error) = each(Ok(&row)) {
-                    return Some(Err(error));
-                }
+                row.clear();
+                row.extend(encoded.iter().map(|(buffer, encoded)| encoded.number(&buffers[*buffer][start..])));
+                each(&row)?;
+            }
+            if rows < expected {
+                return Err(Reason::Truncated { format: FORMAT }.into());
             }
             first += rows;
         }
-        Some(Ok(()))
+        Ok(())
     }
 }
 
@@ -142,16 +125,13 @@ impl NpzReader {
 impl ArrayReader for NpzReader {
     const FORMAT: &'static str = "NumPy .npz";
 
-    fn read(
-        &mut self,
-        array: usize,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
-        let (number, layout) = &self.layouts[array];
-        let mut entry = self.archive.by_index(*number).map_err(damaged)?;
-        ArrayLayout::read(&mut entry, &layout.name)?;
-        layout.columns(&mut BufReader::new(Metered::new(entry, &mut self.meter)), columns, add)
+    fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop> {
+        wanted.held(each, |array, columns| {
+            let (number, layout) = &self.layouts[array];
+            let mut entry = self.archive.by_index(*number).map_err(damaged)?;
+            ArrayLayout::read(&mut entry, &layout.name)?;
+            layout.read_columns(&mut BufReader::new(Metered::new(entry, &mut self.meter)), columns)
+        })
     }
 }
 
@@ -162,27 +142,20 @@ fn entry_layout<R: Read + Seek>(archive: &mut ZipArchive<R>, number: usize) -> R
     let Some(name) = path.strip_suffix(".npy") else { return Ok(None) };
     match ArrayLayout::read(&mut entry, name) {
         Ok(layout) => Ok(Some(layout)),
-        Err(Reason::Array(_)) => Ok(None),
+        Err(Reason::Other(_)) => Ok(None),
         Err(other) => Err(other),
     }
 }
 
 fn damaged(error: zip::result::ZipError) -> Reason {
-    Reason::Format { format: "NumPy .npz", error: error.to_string().into() }
-}
-
-#[derive(Debug, Clone, PartialEq)]
-struct FieldLayout {
-    name: String,
-    offset: usize,
-    encoding: Encoding,
+    Reason::damaged("NumPy .npz", error.to_string())
 }
 
 #[derive(Debug, Clone, PartialEq)]
 struct ArrayLayout {
     name: String,
     rows: usize,
-    fields: Vec<FieldLayout>,
+    columns: Vec<(String, Encoded)>,
     /// Per row, or per element if contiguous.
     stride: usize,
     by_column: bool,
@@ -191,7 +164,7 @@ struct ArrayLayout {
 
 impl ArrayLayout {
     fn read(input: &mut impl Read, name: &str) -> Result<Self, Reason> {
-        let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
+        let unusable = |what: String| Reason::other(format!("array {name:?} {what}"));
         let Header { element, is_fortran_order, shape } = Header::read(input)?;
         let (outer, inner, first_is_time) = match *shape.as_slice() {
             [] => (1, 1, true),
@@ -203,17 +176,16 @@ impl ArrayLayout {
             return Err(unusable(format!("has {inner} columns, more than {MAX_COLUMNS}")));
         }
         let mut unit = None;
-        let mut fields = Vec::new();
+        let mut columns = Vec::new();
         let mut stride = 0usize;
         let mut add = |name: String, encoding: &Encoding| -> Result<(), Reason> {
             if encoding.kind == 'O' {
                 return Err(unusable(OBJECTS.to_owned()));
             }
-            if !encoding.is_number() {
-                return Err(unusable(format!("holds no numbers but {}", encoding.text)));
-            }
+            let scalar = encoding.scalar();
+            let scalar = scalar.ok_or_else(|| unusable(format!("holds no numbers but {}", encoding.text)))?;
             unit = unit.or_else(|| encoding.time_unit().and_then(Unit::parse));
-            fields.push(FieldLayout { name, offset: stride, encoding: encoding.clone() });
+            columns.push((name, Encoded { offset: stride, scalar, is_big_endian: encoding.is_big_endian }));
             stride += encoding.bytes;
             Ok(())
         };
@@ -236,49 +208,30 @@ impl ArrayLayout {
             ElementType::Array(..) => return Err(unusable("has rows within rows".to_owned())),
         };
         let by_column = is_plain && inner > 1 && is_fortran_order == first_is_time;
-        let stride = if by_column { stride / fields.len().max(1) } else { stride };
-        Ok(Self { name: name.to_owned(), rows: outer as usize, fields, stride, by_column, unit })
+        if by_column {
+            stride /= columns.len();
+            columns.iter_mut().for_each(|(_, encoded)| encoded.offset = 0);
+        }
+        Ok(Self { name: name.to_owned(), rows: outer as usize, columns, stride, by_column, unit })
     }
 
     fn array(&self) -> NamedArray {
-        let columns = self.fields.iter().map(|field| field.name.clone()).collect();
+        let columns = self.columns.iter().map(|(name, _)| name.clone()).collect();
         NamedArray { name: self.name.clone(), rows: self.rows, columns, unit: self.unit, ..NamedArray::default() }
     }
 
-    fn columns(
-        &self,
-        input: &mut impl Read,
-        columns: &[usize],
-        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
-        if self.rows as u64 > MAX_SAMPLES {
-            return Err(Reason::TooManySamples);
-        }
-        add(self.rows as u64 * columns.len() as u64)?;
-        let mut values: Vec<Vec<Number>> = columns.iter().map(|_| Vec::new()).collect();
+    fn read_columns(&self, input: &mut impl Read, columns: &[usize]) -> Result<Vec<Vec<Number>>, Reason> {
+        let mut values: Vec<Vec<Number>> = vec![Vec::new(); columns.len()];
         let mut bytes = vec![0; self.stride];
-        let mut read = |bytes: &mut [u8]| {
-            input.read_exact(bytes).map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
-                _ => Reason::from_io(error),
-            })
-        };
-        if self.by_column {
-            for number in 0..self.fields.len() {
-                let at = columns.iter().position(|column| *column == number);
-                for _ in 0..self.rows {
-                    read(&mut bytes)?;
-                    if let Some(at) = at {
-                        values[at].push(decode(&self.fields[number].encoding, &bytes));
-                    }
-                }
-            }
-        } else {
+        // Elements of one column after the other, or rows of all.
+        let parts = if self.by_column { self.columns.len() } else { 1 };
+        for part in 0..parts {
             for _ in 0..self.rows {
-                read(&mut bytes)?;
+                input.read_exact(&mut bytes).map_err(|error| Reason::ended(FORMAT, error))?;
                 for (values, &column) in values.iter_mut().zip(columns) {
-                    let field = &self.fields[column];
-                    values.push(decode(&field.encoding, &bytes[field.offset..]));
+                    if !self.by_column || column == part {
+                        values.push(self.columns[column].1.number(&bytes));
+                    }
                 }
             }
         }
@@ -308,25 +261,4 @@ fn flatten<'a>(name: &str, element: &'a ElementType, plain: &mut Vec<(String, &'
     }
     let most = MAX_COLUMNS;
     if plain.len() as u64 > most { Err(format!("has more than {most} columns")) } else { Ok(()) }
-}
-
-/// NaN if too short.
-fn decode(encoding: &Encoding, bytes: &[u8]) -> Number {
-    let size = encoding.bytes;
-    let Some(own) = bytes.get(..size).filter(|own| own.len() <= 8) else { return Number::Real(f64::NAN) };
-    let mut word = [0; 8];
-    match <[u8; 8]>::try_from(own) {
-        Ok(whole) => word = whole,
-        Err(_) => word[..size].copy_from_slice(own),
-    }
-    if encoding.is_big_endian {
-        word[..size].reverse();
-    }
-    let bits = u64::from_le_bytes(word);
-    let unused = 64 - 8 * size as u32;
-    match encoding.kind {
-        'f' => Scalar::Float(size as u8).number(bits),
-        'u' | 'b' => i64::try_from(bits).map_or(Number::Real(bits as f64), Number::Integer),
-        _ => Number::Integer((bits << unused).cast_signed() >> unused),
-    }
 }

@@ -1,7 +1,9 @@
 //! The header of a NumPy array (format 1.0 to 3.0), a literal of Python.
 
+use crate::formats::message_layout::Scalar;
+use crate::input::budget::too_deep;
 use crate::input::input_error::Reason;
-use std::io::{self, ErrorKind, Read};
+use std::io::Read;
 
 const FORMAT: &str = "NumPy array";
 const MOST_BRACKETS: usize = 8;
@@ -44,7 +46,7 @@ impl Header {
         fill(input, &mut length[..if start[6] == 1 { 2 } else { 4 }])?;
         let length = u64::from_le_bytes(length);
         if length > MOST_BYTES {
-            return Err(Reason::Array(format!("the header of the array has {length} bytes")));
+            return Err(Reason::other(format!("the header of the array has {length} bytes")));
         }
         let mut text = vec![0; length as usize];
         fill(input, &mut text)?;
@@ -69,14 +71,11 @@ impl Header {
 }
 
 fn damaged(what: &str) -> Reason {
-    Reason::Format { format: FORMAT, error: what.into() }
+    Reason::damaged(FORMAT, what)
 }
 
 fn fill(input: &mut impl Read, bytes: &mut [u8]) -> Result<(), Reason> {
-    input.read_exact(bytes).map_err(|error: io::Error| match error.kind() {
-        ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },
-        _ => Reason::from_io(error),
-    })
+    input.read_exact(bytes).map_err(|error| Reason::ended(FORMAT, error))
 }
 
 fn element(descr: &Literal) -> Result<ElementType, Reason> {
@@ -132,12 +131,13 @@ impl Encoding {
     }
 
     /// A number or time of a readable size.
-    pub(crate) fn is_number(&self) -> bool {
-        match self.kind {
-            'i' | 'u' | 'b' => matches!(self.bytes, 1 | 2 | 4 | 8),
-            'f' => matches!(self.bytes, 2 | 4 | 8),
-            'M' | 'm' => self.bytes == 8,
-            _ => false,
+    pub(crate) fn scalar(&self) -> Option<Scalar> {
+        let bytes = self.bytes as u8;
+        match (self.kind, self.bytes) {
+            ('i', 1 | 2 | 4 | 8) | ('M' | 'm', 8) => Some(Scalar::Signed(bytes)),
+            ('u' | 'b', 1 | 2 | 4 | 8) => Some(Scalar::Unsigned(bytes)),
+            ('f', 2 | 4 | 8) => Some(Scalar::Float(bytes)),
+            _ => None,
         }
     }
 }
@@ -188,7 +188,7 @@ impl Parser<'_> {
     fn enter(&mut self) -> Result<(), Reason> {
         self.depth += 1;
         self.rest = &self.rest[1..];
-        if self.depth > MOST_BRACKETS { Err(Reason::TooDeep { most: MOST_BRACKETS }) } else { Ok(()) }
+        if self.depth > MOST_BRACKETS { Err(too_deep(MOST_BRACKETS)) } else { Ok(()) }
     }
 
     fn leave(&mut self, end: char) -> bool {
@@ -273,6 +273,6 @@ mod tests {
             assert!(header(text).is_err(), "{text}");
         }
         let deep = "[".repeat(60_000);
-        assert!(matches!(header(&deep), Err(Reason::TooDeep { .. })));
+        assert!(matches!(header(&deep), Err(Reason::Limit(_))));
     }
 }

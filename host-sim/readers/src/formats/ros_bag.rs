@@ -4,7 +4,7 @@
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
-use crate::formats::topics::{EachRow, Ending, Offer, Source};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Stop};
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
@@ -43,17 +43,6 @@ struct Connection {
     definition: String,
 }
 
-enum Stop {
-    Refusal(InputError),
-    Reason(Reason),
-}
-
-impl From<Reason> for Stop {
-    fn from(reason: Reason) -> Self {
-        Self::Reason(reason)
-    }
-}
-
 type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
 
 pub(crate) struct RosBagSource<'a> {
@@ -75,8 +64,9 @@ impl<'a> RosBagSource<'a> {
         let fail = |reason| file.error(reason);
         let mut found: BTreeMap<String, FoundTopic> = BTreeMap::new();
         let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
-        let mut input = BagBytes::open(file).map_err(fail)?;
-        let has_index = input.seek_index().map_err(fail)?;
+        let failed = |error| fail(Reason::Io(error));
+        let mut input = open(file).map_err(failed)?;
+        let has_index = seek_index(&mut input).map_err(failed)?;
         let damage = for_each_record(file, &mut input, budget, &mut |record| {
             match record {
                 Record::Connection(Connection { id, topic, kind, definition }) => {
@@ -122,7 +112,7 @@ impl Source for RosBagSource<'_> {
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let mut rows = RosRows::new(&self.layouts[topic], Encoding::Packed, columns);
         let connections = &self.connections[topic];
-        let mut input = BagBytes::open(self.file).map_err(|reason| self.file.error(reason))?;
+        let mut input = open(self.file).map_err(|error| self.file.error(Reason::Io(error)))?;
         let damage = for_each_record(self.file, &mut input, self.budget, &mut |record| match record {
             Record::Message { connection, recorded_ns, data } if connections.contains(&connection) => {
                 each(rows.row(data, Some(recorded_ns)))
@@ -133,29 +123,26 @@ impl Source for RosBagSource<'_> {
     }
 }
 
-struct BagBytes {
-    input: BufReader<OpenBytes>,
+type BagBytes = BufReader<OpenBytes>;
+
+/// Behind the first bytes.
+fn open(file: &FileBytes) -> io::Result<BagBytes> {
+    let mut input = BufReader::with_capacity(BUFFER_BYTES, file.open()?);
+    input.seek(SeekFrom::Start(MAGIC.len() as u64))?;
+    Ok(input)
 }
 
-impl BagBytes {
-    fn open(file: &FileBytes) -> Result<Self, Reason> {
-        let mut input = BufReader::with_capacity(BUFFER_BYTES, file.open().map_err(Reason::Io)?);
-        input.seek(SeekFrom::Start(MAGIC.len() as u64)).map_err(Reason::Io)?;
-        Ok(Self { input })
-    }
-
-    fn seek_index(&mut self) -> Result<bool, Reason> {
-        let start = MAGIC.len() as u64;
-        let length = self.input.seek(SeekFrom::End(0)).map_err(Reason::Io)?;
-        self.input.seek(SeekFrom::Start(start)).map_err(Reason::Io)?;
-        let (mut header, mut data) = (Vec::new(), Vec::new());
-        let is_read = next_record(&mut self.input, &mut header).is_ok_and(|is_one| is_one)
-            && read_data(&mut self.input, &mut data).is_ok();
-        let index = field(&header, b"index_pos").map_or(0, number);
-        let has_index = is_read && kind(&header) == Some(BAG_HEADER) && (start + 1..length).contains(&index);
-        self.input.seek(SeekFrom::Start(if has_index { index } else { start })).map_err(Reason::Io)?;
-        Ok(has_index)
-    }
+/// False without an index.
+fn seek_index(input: &mut BagBytes) -> io::Result<bool> {
+    let start = MAGIC.len() as u64;
+    let length = input.seek(SeekFrom::End(0))?;
+    input.seek(SeekFrom::Start(start))?;
+    let (mut header, mut data) = (Vec::new(), Vec::new());
+    let is_read = next_record(input, &mut header).is_ok_and(|is_one| is_one) && read_data(input, &mut data).is_ok();
+    let index = field(&header, b"index_pos").map_or(0, number);
+    let has_index = is_read && kind(&header) == Some(BAG_HEADER) && (start + 1..length).contains(&index);
+    input.seek(SeekFrom::Start(if has_index { index } else { start }))?;
+    Ok(has_index)
 }
 
 /// From here on, with the reason of an early end.
@@ -166,11 +153,9 @@ fn for_each_record(
     each: &mut EachRecord,
 ) -> Result<Option<Reason>, InputError> {
     let mut meter = budget.meter();
-    match read_records(&mut input.input, &mut meter, true, each) {
-        Ok(()) => Ok(None),
-        Err(Stop::Refusal(error)) => Err(error),
-        Err(Stop::Reason(Reason::Io(error))) => Err(file.error(Reason::Io(error))),
-        Err(Stop::Reason(reason)) => Ok(Some(reason)),
+    match Stop::damage(read_records(input, &mut meter, true, each))? {
+        Some(Reason::Io(error)) => Err(file.error(Reason::Io(error))),
+        damage => Ok(damage),
     }
 }
 
@@ -231,7 +216,7 @@ fn give(header: &[u8], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
         (Some(CHUNK_INFO), _) => Record::ChunkInfo(data),
         _ => return Ok(()),
     };
-    each(record).map_err(Stop::Refusal)
+    Ok(each(record)?)
 }
 
 fn read_chunk(input: &mut dyn BufRead, header: &[u8], meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
@@ -252,7 +237,7 @@ fn read_chunk(input: &mut dyn BufRead, header: &[u8], meter: &mut Meter, each: &
     };
     read?;
     // Padding.
-    io::copy(input, &mut io::sink()).map_err(|error| Stop::Reason(Reason::Io(error)))?;
+    io::copy(input, &mut io::sink()).map_err(Reason::Io)?;
     Ok(())
 }
 
@@ -300,9 +285,8 @@ fn fill(input: &mut dyn BufRead, bytes: &mut [u8]) -> Result<(), Reason> {
 
 fn refused(error: io::Error) -> Reason {
     match error.kind() {
-        ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },
         ErrorKind::InvalidData | ErrorKind::InvalidInput => damaged(format!("a compressed chunk: {error}")),
-        _ => match Reason::from_io(error) {
+        _ => match Reason::ended(FORMAT, error) {
             Reason::Io(error) if error.raw_os_error().is_none() => damaged(format!("a compressed chunk: {error}")),
             reason => reason,
         },
@@ -310,7 +294,7 @@ fn refused(error: io::Error) -> Reason {
 }
 
 fn damaged(error: String) -> Reason {
-    Reason::Format { format: FORMAT, error: error.into() }
+    Reason::damaged(FORMAT, error)
 }
 
 /// Length, name, `=`, value.
@@ -434,7 +418,7 @@ mod tests {
             let bytes = chunk(compression, &compressed(compression, &[records(1), zeros.clone()].concat()));
             let file = bag(&[bytes]);
             let refused = RosBagSource::open(&file, Budget::new(0)).err().expect("refused").reason;
-            assert!(matches!(refused, Reason::Expands { .. }), "{compression}: {refused}");
+            assert!(matches!(refused, Reason::Limit(_)), "{compression}: {refused}");
         }
         let file = bag(&[[&8u32.to_le_bytes()[..], &fields(&[("op", &[2])]), &[0xFF; 4]].concat()]);
         assert!(RosBagSource::open(&file, Budget::new(0)).is_err());

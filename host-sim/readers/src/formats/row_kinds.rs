@@ -7,21 +7,8 @@ use crate::input::input_error::Reason;
 
 const MOST_KINDS: usize = 8;
 const LEAST_ROWS: usize = 2;
-/// Columns that number devices.
-const NUMBERED: [&str; 12] = [
-    "id",
-    "device",
-    "device_id",
-    "deviceid",
-    "sensor",
-    "sensor_id",
-    "sensorid",
-    "node",
-    "node_id",
-    "imu",
-    "imu_id",
-    "instance",
-];
+/// Columns that number devices, between blanks.
+const NUMBERED: &str = "id device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance";
 const LEAST_NUMBERS: usize = 2;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,7 +60,8 @@ impl RowKinds {
 
     /// By a column that numbers devices.
     pub(crate) fn find_by_number(rows: &[Vec<&str>], heading: &[&str]) -> Option<Self> {
-        let is_named = |name: &&str| NUMBERED.contains(&name.to_lowercase().trim_start_matches(['#', '%', ' ']));
+        let plain = |name: &str| name.to_lowercase().trim_start_matches(['#', '%', ' ']).to_owned();
+        let is_named = |name: &&str| NUMBERED.split(' ').any(|known| known == plain(name));
         let at = heading.iter().position(is_named).filter(|at| rows.iter().all(|row| row.len() > *at))?;
         Self::of_labels(rows, at, |field| field.parse::<u32>().is_ok())
     }

@@ -34,7 +34,7 @@ impl<'a> SqliteSource<'a> {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let copy = match file.file() {
             Some(_) => None,
-            None => Some(file.open().and_then(|input| FileBytes::copied(file.name(), input))),
+            None => Some(file.open().and_then(|input| FileBytes::copied(file.name(), input, ""))),
         };
         let copy = copy.transpose().map_err(|error| file.error(Reason::Io(error)))?;
         let path = copy.as_ref().and_then(FileBytes::file).or(file.file()).unwrap_or(file.name());
@@ -90,13 +90,13 @@ fn definitions(database: &Connection) -> rusqlite::Result<HashMap<String, String
 fn damaged(error: rusqlite::Error, budget: Budget) -> Reason {
     match budget.check_time() {
         Err(too_slow) => too_slow,
-        Ok(()) => Reason::Format { format: FORMAT, error: error.to_string().into() },
+        Ok(()) => Reason::damaged(FORMAT, error.to_string()),
     }
 }
 
 fn damaged_message(error: io::Error) -> Reason {
     match Reason::from_io(error) {
-        Reason::Io(error) => Reason::Format { format: FORMAT, error: format!("a compressed message: {error}").into() },
+        Reason::Io(error) => Reason::damaged(FORMAT, format!("a compressed message: {error}")),
         refused => refused,
     }
 }
@@ -171,7 +171,7 @@ mod tests {
         let opened = SqliteSource::open(&file, Budget::new(0)).expect("a bag");
         assert_eq!(opened.topics().len(), 20_000);
         let stopped = reason(SqliteSource::open(&file, Budget::spent()));
-        assert!(matches!(stopped, Some(Reason::TooSlow { .. })), "{stopped:?}");
+        assert!(matches!(stopped, Some(Reason::Limit(_))), "{stopped:?}");
     }
 
     #[test]

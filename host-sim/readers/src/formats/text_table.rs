@@ -1,18 +1,16 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, SelectionError, as_they_are};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ReadOptions, Role, SelectionError, as_they_are};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
 use crate::formats::fields::{leading_number, number, split};
 use crate::formats::labelled_row;
 use crate::formats::nmea::{self, Sentence};
 use crate::formats::row_kinds::{RowKind, RowKinds};
 use crate::formats::table_head::{self, HEAD_LINES, Line, TableColumns, TableHead, is_row};
-use crate::input::budget::Budget;
 use crate::input::delimited_text::{self, Lines};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
-use crate::rows::any_sensor::ReadOptions;
 use crate::rows::batch::{Number, RowFault};
 use crate::rows::row_source::{EachRow, Ending, Refusal, RowSource};
 use crate::rows::whole_table::WholeTable;
@@ -23,47 +21,6 @@ use std::path::PathBuf;
 const MOST_DAMAGED: f64 = 0.1;
 const FIRST_DAMAGED: u64 = 64;
 
-/// Re-readable; a monitor counts bytes and may stop.
-pub(crate) struct TextRows<'a> {
-    file: &'a FileBytes,
-    options: ReadOptions,
-    monitor: ReadMonitor,
-    chosen: Vec<ChosenColumn>,
-    rate_hz: Option<f64>,
-    opened: Option<TextTable>,
-}
-
-impl<'a> TextRows<'a> {
-    pub(crate) fn open(file: &'a FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
-        let table = TextTable::open(file, options, monitor)?;
-        let (chosen, rate_hz) = (table.chosen.clone(), table.rate_hz);
-        let (options, monitor) = (options.clone(), monitor.clone());
-        Ok(Self { file, options, monitor, chosen, rate_hz, opened: Some(table) })
-    }
-}
-
-impl RowSource for TextRows<'_> {
-    fn chosen(&self) -> &[ChosenColumn] {
-        &self.chosen
-    }
-
-    fn rate_hz(&self) -> Option<f64> {
-        self.rate_hz
-    }
-
-    fn budget(&self) -> Option<Budget> {
-        None
-    }
-
-    fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
-        let mut table = match self.opened.take() {
-            Some(table) => table,
-            None => TextTable::open(self.file, &self.options, &self.monitor)?,
-        };
-        table.read(each)
-    }
-}
-
 pub(crate) fn read_whole(
     file: &FileBytes,
     topic: Option<&str>,
@@ -71,7 +28,7 @@ pub(crate) fn read_whole(
 ) -> Result<WholeTable, InputError> {
     let table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
     let whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
-    whole.read(&mut TextTable { is_lenient: true, ..table })
+    whole.read(file.name(), &mut TextTable { is_lenient: true, ..table })
 }
 
 type Choose<'a> = dyn Fn(&[AvailableColumn]) -> Result<Vec<ChosenColumn>, SelectionError> + 'a;
@@ -134,6 +91,8 @@ pub(crate) struct TextTable {
     columns_notes: Vec<String>,
     damaged: DamagedRows,
     is_lenient: bool,
+    /// Rows begin with a letter.
+    are_words: bool,
     fields: RowFields,
     first: VecDeque<(u64, String)>,
     row: Vec<Number>,
@@ -159,7 +118,7 @@ impl TextTable {
             let Some((line, text)) = lines.next_line()? else { break };
             first.push((line, text.to_owned()));
         }
-        let opened = Opened { file, choose, lines };
+        let mut opened = Opened { file, choose, lines };
         let is_whole = first.len() < HEAD_LINES;
         let sentence = first.iter().position(|(_, text)| Sentence::parse(text).is_some());
         let row = first.iter().position(|(_, text)| is_row(text));
@@ -176,10 +135,11 @@ impl TextTable {
                     return opened.labelled(names, first);
                 }
                 let last = first.last().map(|(line, _)| *line);
-                Err(match last {
-                    None => file.error(Reason::Empty),
-                    Some(_) if is_whole => file.error(Reason::NoData),
-                    Some(line) => InputError::line(file.name(), line, Reason::NoNumbers),
+                Err(match (last, opened.lines.take_damage()) {
+                    (_, Some(damage)) => file.error(damage),
+                    (None, None) => file.error(Reason::Empty),
+                    (Some(_), None) if is_whole => file.error(Reason::NoData),
+                    (Some(line), None) => InputError::line(file.name(), line, Reason::NoNumbers),
                 })
             }
         }
@@ -259,6 +219,7 @@ impl Opened<'_> {
             columns_notes: Vec::new(),
             damaged: DamagedRows::default(),
             is_lenient: false,
+            are_words: first.front().is_some_and(|(_, text)| text.starts_with(|sign: char| sign.is_ascii_alphabetic())),
             fields,
             first,
         }
@@ -331,10 +292,6 @@ impl RowSource for TextTable {
         self.rate_hz
     }
 
-    fn budget(&self) -> Option<Budget> {
-        None
-    }
-
     fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
         while let Some(line) = self.next_row()? {
             match each(&self.row) {
@@ -347,7 +304,7 @@ impl RowSource for TextTable {
             }
         }
         self.damaged.check()?;
-        Ok(Ending { damage: None, notes: self.notes() })
+        Ok(Ending { damage: self.lines.take_damage(), notes: self.notes() })
     }
 }
 
@@ -387,7 +344,7 @@ impl TextTable {
 
     /// Into `row`; `None` at the end.
     fn next_row(&mut self) -> Result<Option<u64>, InputError> {
-        let Self { file, lines, chosen, layout, is_lenient, fields: of_row, first, row, damaged, .. } = self;
+        let Self { file, lines, chosen, layout, is_lenient, are_words, fields: of_row, first, row, damaged, .. } = self;
         let plain = match layout {
             Layout::Columns { separator, calendar: None, kind: None, .. } if first.is_empty() => *separator,
             _ => None,
@@ -406,6 +363,7 @@ impl TextTable {
                     None => return Ok(None),
                 },
             };
+            let mut is_short = false;
             let of_layout = match layout {
                 Layout::Columns { separator, kind: Some(RowKind::Labelled { at, name }), others, .. }
                     if split(text, *separator).nth(*at) != Some(name) =>
@@ -433,6 +391,7 @@ impl TextTable {
                     let row_of = labelled_row::parse(text);
                     match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
                         Some(row_of) => {
+                            is_short = row_of.len() < names.len();
                             let values = values_of(names, row_of);
                             of_row.numbers(values.iter().map(String::as_str), calendar.as_mut(), row).map(|()| true)
                         }
@@ -445,6 +404,7 @@ impl TextTable {
                 Layout::Sentences { name, damaged, others } => match Sentence::parse(text) {
                     Some(sentence) if !sentence.is_intact => {
                         *damaged += 1;
+                        is_short = true;
                         row.clear();
                         row.resize(chosen.len(), Number::Real(f64::NAN));
                         // A sample without values; its time must be known.
@@ -464,6 +424,18 @@ impl TextTable {
                 (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
                 fault => Err(fault),
             });
+            if let Some(last) = lines.unended(line) {
+                let starts_as_row = match layout {
+                    Layout::Columns { .. } => last.first.is_ascii_alphabetic() == *are_words,
+                    Layout::Sentences { .. } | Layout::Labelled { .. } => true,
+                };
+                let is_row = of_layout.as_ref().is_ok_and(|is_own| *is_own || matches!(layout, Layout::Columns { .. }));
+                let is_part = starts_as_row && !b"#%/*;".contains(&last.first) && (!is_row || is_short);
+                if is_part || last.is_in_quotes {
+                    lines.ends_within(line);
+                    return Ok(None);
+                }
+            }
             match of_layout {
                 Ok(true) => return Ok(Some(line)),
                 Ok(false) => {}

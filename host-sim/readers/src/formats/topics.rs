@@ -1,13 +1,13 @@
 //! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, as_they_are};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, ReadOptions, as_they_are};
 use crate::columns::unit::Unit;
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::rows::any_sensor::ReadOptions;
 use crate::rows::batch::Number;
+pub(crate) use crate::rows::row_source::Ending;
 use crate::rows::row_source::{self, Refusal, RowSource};
-use crate::rows::whole_table::{WholeSensor, WholeTable};
+use crate::rows::whole_table::{TopicSensor, WholeTable};
 use measurement::SensorProfile;
 use std::path::Path;
 
@@ -21,29 +21,6 @@ pub(crate) struct Topic {
     pub(crate) rows: Option<u64>,
     pub(crate) columns: Vec<AvailableColumn>,
     pub(crate) sensors: Vec<TopicSensor>,
-}
-
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct TopicSensor {
-    /// Empty for a single one.
-    pub(crate) name: String,
-    /// Channel, `time` or `sample`; position; unit if the column lacks it.
-    pub(crate) columns: Vec<(&'static str, usize, Option<Unit>)>,
-    /// Reason of unstated units.
-    pub(crate) note: Option<String>,
-}
-
-impl TopicSensor {
-    /// True if it has the channel.
-    pub(crate) fn has(&self, channel: &str) -> bool {
-        self.columns.iter().any(|(name, ..)| *name == channel)
-    }
-
-    /// In `unit`.
-    pub(crate) fn add_axes(&mut self, channels: [&'static str; 3], positions: [usize; 3], unit: &str) {
-        let unit = Unit::parse(unit);
-        self.columns.extend(channels.into_iter().zip(positions).map(|(channel, at)| (channel, at, unit)));
-    }
 }
 
 /// A source of rows: topic, group or array.
@@ -88,13 +65,37 @@ impl Offer {
     }
 }
 
-#[derive(Debug, Default)]
-pub(crate) struct Ending {
-    pub(crate) damage: Option<Reason>,
-    pub(crate) notes: Vec<String>,
+pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + 'a;
+
+/// Why a reading ends early.
+pub(crate) enum Stop {
+    Damage(Reason),
+    /// By the one who gets what is read.
+    Refusal(InputError),
 }
 
-pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + 'a;
+impl From<Reason> for Stop {
+    fn from(reason: Reason) -> Self {
+        Self::Damage(reason)
+    }
+}
+
+impl From<InputError> for Stop {
+    fn from(error: InputError) -> Self {
+        Self::Refusal(error)
+    }
+}
+
+impl Stop {
+    /// The damage of what was `read`; a refusal is an error.
+    pub(crate) fn damage(read: Result<(), Self>) -> Result<Option<Reason>, InputError> {
+        match read {
+            Ok(()) => Ok(None),
+            Err(Self::Damage(reason)) => Ok(Some(reason)),
+            Err(Self::Refusal(error)) => Err(error),
+        }
+    }
+}
 
 pub(crate) trait Source: Send {
     fn offer(&self) -> &Offer;
@@ -250,7 +251,15 @@ pub(crate) struct TopicRows<'a> {
     topic: usize,
     chosen: Vec<ChosenColumn>,
     notes: Vec<String>,
-    budget: Budget,
+    limits: FileLimits,
+}
+
+/// Limits of a file.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FileLimits {
+    pub(crate) budget: Budget,
+    /// Compression whose data end early.
+    pub(crate) cut: Option<&'static str>,
 }
 
 impl<'a> TopicRows<'a> {
@@ -258,7 +267,7 @@ impl<'a> TopicRows<'a> {
         file: &'a Path,
         source: Box<dyn Source + 'a>,
         options: &ReadOptions,
-        budget: Budget,
+        limits: FileLimits,
     ) -> Result<Self, InputError> {
         let fail = |reason| InputError::file(file, reason);
         let choice = choose(source.as_ref(), options).map_err(fail)?;
@@ -266,8 +275,16 @@ impl<'a> TopicRows<'a> {
         if topic.columns.is_empty() {
             return Err(fail(match &topic.encoding {
                 _ if source.offer().whole.is_some() => Reason::NoTopic { format: source.offer().format },
-                Some(encoding) => Reason::Encoding(Box::new((topic.name.clone(), encoding.clone()))),
-                None => Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone()))),
+                Some(encoding) => Reason::other(format!(
+                    "the messages of {} are encoded in {encoding}; those of ROS 1 and ROS 2 (ros1, cdr) are decoded; in Python, \
+                         mcap.reader gives the messages, of which a table is made by csv.writer",
+                    topic.name
+                )),
+                None => Reason::other(format!(
+                    "the messages of {} cannot be decoded: the file has no definition of {}; where that package is installed, \
+                         `ros2 bag convert` to MCAP writes it along",
+                    topic.name, topic.kind
+                )),
             }));
         }
         let sensor = choice.sensor.map(|at| &topic.sensors[at]);
@@ -284,7 +301,7 @@ impl<'a> TopicRows<'a> {
                 notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
             }
         }
-        Ok(Self { file, source, topic: choice.topic, chosen, notes, budget })
+        Ok(Self { file, source, topic: choice.topic, chosen, notes, limits })
     }
 }
 
@@ -299,11 +316,11 @@ impl RowSource for TopicRows<'_> {
     }
 
     fn budget(&self) -> Option<Budget> {
-        Some(self.budget)
+        Some(self.limits.budget)
     }
 
-    fn read(&mut self, each: &mut row_source::EachRow) -> Result<row_source::Ending, InputError> {
-        let Self { file, source, topic, chosen, notes, .. } = self;
+    fn read(&mut self, each: &mut row_source::EachRow) -> Result<Ending, InputError> {
+        let Self { file, source, topic, chosen, notes, limits } = self;
         let columns: Vec<usize> = chosen.iter().map(|column| column.position).collect();
         let (mut rows, mut is_enough) = (0u64, false);
         let ending = source.read(*topic, &columns, &mut |row| {
@@ -319,17 +336,16 @@ impl RowSource for TopicRows<'_> {
                 }
             })
         });
-        let Ending { damage, notes: of_rows } = match ending {
+        let mut ending = match ending {
             Err(_) if is_enough => Ending::default(),
-            ending => ending?,
-        };
-        match damage {
-            Some(reason) if rows == 0 || reason.is_limit() => Err(InputError::file(file, reason)),
-            damage => {
-                let notes = of_rows.into_iter().chain(notes.iter().cloned()).collect();
-                Ok(row_source::Ending { damage: damage.map(|reason| reason.to_string()), notes })
+            ending => {
+                let ending = ending?;
+                let cut = limits.cut.map(|format| Reason::Truncated { format });
+                Ending { damage: ending.damage.or(cut), ..ending }
             }
-        }
+        };
+        ending.notes.extend(notes.iter().cloned());
+        Ok(ending)
     }
 }
 
@@ -341,7 +357,7 @@ pub(crate) fn read_whole<'a>(
     file: &'a Path,
     mut source: Box<dyn Source + 'a>,
     topic: Option<&str>,
-    budget: Budget,
+    limits: FileLimits,
 ) -> Result<Vec<WholeTable>, InputError> {
     let known = sensors(source.topics());
     let topics: Vec<usize> = match (topic, source.offer().whole) {
@@ -369,8 +385,8 @@ pub(crate) fn read_whole<'a>(
             let whole = described(source.as_ref(), at, &available);
             let mut chosen = as_they_are(&available);
             chosen.iter_mut().for_each(|column| column.position = columns[column.position]);
-            let mut rows = TopicRows { file, source, topic: at, chosen, notes: Vec::new(), budget };
-            match whole.read(&mut rows) {
+            let mut rows = TopicRows { file, source, topic: at, chosen, notes: Vec::new(), limits };
+            match whole.read(file, &mut rows) {
                 Ok(table) => tables.push(table),
                 Err(error) => refused = refused.or(Some(error)),
             }
@@ -401,7 +417,7 @@ fn described(source: &dyn Source, topic: usize, chosen: &[AvailableColumn]) -> W
                 Some((channel, position(&of.columns[at].name)?, unit))
             };
             if let Some(columns) = sensor.columns.iter().map(column).collect() {
-                whole.sensors.push(WholeSensor { name: sensor_name(of, sensor), columns });
+                whole.sensors.push(TopicSensor { name: sensor_name(of, sensor), columns, note: None });
             }
         }
     }

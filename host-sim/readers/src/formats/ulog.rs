@@ -1,13 +1,14 @@
 //! ULog of PX4: sensors by message or FIFO, and any message. The crate `px4-ulog` follows nested formats without limit.
 
-use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
+use crate::columns::{ACCELEROMETER, GYROSCOPE};
 use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
 use crate::input::budget::Budget;
 use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
+use crate::rows::whole_table::TopicSensor;
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::rc::Rc;
@@ -390,8 +391,8 @@ fn for_each_message(
             },
             b'I' | b'M' | b'P' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
             _ => {
-                let error = format!("a message of unknown type {kind:#04x}").into();
-                return Ok(Some(Reason::Format { format: FORMAT, error }));
+                let error = format!("a message of unknown type {kind:#04x}");
+                return Ok(Some(Reason::damaged(FORMAT, error)));
             }
         }
     }
@@ -423,8 +424,7 @@ fn flag_bits(message: &[u8]) -> Result<Vec<u64>, Reason> {
     let unknown =
         incompatible.iter().enumerate().any(|(at, flags)| flags & !(if at == 0 { DATA_APPENDED } else { 0 }) != 0);
     if unknown {
-        let error = "it has features that a reader has to know, and this one does not".into();
-        return Err(Reason::Format { format: FORMAT, error });
+        return Err(Reason::damaged(FORMAT, "it has features that a reader has to know, and this one does not"));
     }
     let offsets = message.get(16..40).unwrap_or_default().chunks_exact(8);
     let offsets = offsets.map(|bytes| bytes.iter().rev().fold(0, |offset, byte| offset << 8 | u64::from(*byte)));

@@ -69,14 +69,21 @@ impl Budget {
     }
 
     pub(crate) fn check_depth(levels: usize) -> Result<(), Reason> {
-        if levels > MOST_LEVELS { Err(Reason::TooDeep { most: MOST_LEVELS }) } else { Ok(()) }
+        if levels > MOST_LEVELS { Err(too_deep(MOST_LEVELS)) } else { Ok(()) }
     }
 
     #[cfg(any(feature = "sqlite", test))]
     pub(crate) fn check_time(self) -> Result<(), Reason> {
+        let seconds = self.time.as_secs();
+        let told = || format!("not read within {seconds} s, far longer than a recording of this size takes");
         let is_late = self.end.is_some_and(|end| Instant::now() > end);
-        if is_late { Err(Reason::TooSlow { seconds: self.time.as_secs() }) } else { Ok(()) }
+        if is_late { Err(Reason::Limit(told())) } else { Ok(()) }
     }
+}
+
+/// For nesting beyond `most` levels.
+pub(crate) fn too_deep(most: usize) -> Reason {
+    Reason::Limit(format!("nested more than {most} levels deep"))
 }
 
 #[derive(Debug)]
@@ -93,16 +100,22 @@ impl Meter {
 
     pub(crate) fn add_bytes(&mut self, bytes: u64) -> Result<(), Reason> {
         self.bytes = self.bytes.saturating_add(bytes);
-        if self.bytes > self.budget.bytes {
-            return Err(Reason::Expands { bytes: self.budget.bytes });
+        let most = self.budget.bytes;
+        if self.bytes > most {
+            return Err(Reason::Limit(format!(
+                "its data are more than {most} bytes, far more than a recording of this size has; decompress it or save it uncompressed"
+            )));
         }
         Ok(())
     }
 
     pub(crate) fn add_values(&mut self, values: u64) -> Result<(), Reason> {
         self.values = self.values.saturating_add(values);
-        if self.values > self.budget.values {
-            return Err(Reason::TooManyValues { values: self.budget.values });
+        let most = self.budget.values;
+        if self.values > most {
+            return Err(Reason::Limit(format!(
+                "more than {most} numbers, far more than a recording of this size has; save it uncompressed"
+            )));
         }
         Ok(())
     }
@@ -144,18 +157,18 @@ mod tests {
         let (bytes, values) = (BYTES_OF_ANY + 1_000 * BYTES_PER_BYTE, VALUES_OF_ANY + 1_000 * VALUES_PER_BYTE);
         let mut meter = budget.meter();
         meter.add_bytes(bytes).expect("within the budget");
-        assert!(matches!(meter.add_bytes(1), Err(Reason::Expands { bytes: of }) if of == bytes));
+        assert!(matches!(meter.add_bytes(1), Err(Reason::Limit(told)) if told.contains(&bytes.to_string())));
         meter.add_values(values).expect("within the budget");
-        assert!(matches!(meter.add_values(1), Err(Reason::TooManyValues { values: of }) if of == values));
+        assert!(matches!(meter.add_values(1), Err(Reason::Limit(told)) if told.contains(&values.to_string())));
         budget.meter().add_bytes(bytes).expect("a second reading");
         Budget::check_depth(MOST_LEVELS).expect("within the budget");
-        assert!(matches!(Budget::check_depth(MOST_LEVELS + 1), Err(Reason::TooDeep { .. })));
+        assert!(matches!(Budget::check_depth(MOST_LEVELS + 1), Err(Reason::Limit(_))));
     }
 
     #[test]
     fn what_a_decompressor_gives_is_counted_and_the_reason_comes_back() {
         let mut endless = Metered::new(std::io::repeat(0), Budget::new(0).meter());
         let error = std::io::copy(&mut endless.by_ref().take(u64::MAX), &mut std::io::sink()).unwrap_err();
-        assert!(matches!(Reason::from_io(error), Reason::Expands { bytes } if bytes == BYTES_OF_ANY));
+        assert!(matches!(Reason::from_io(error), Reason::Limit(told) if told.contains(&BYTES_OF_ANY.to_string())));
     }
 }

@@ -26,6 +26,11 @@ pub struct Lines {
     is_latin: bool,
     /// The line in `bytes` comes again.
     again: bool,
+    /// The last line, if it has no line end.
+    unended: Option<Unended>,
+    damage: Option<Reason>,
+    /// Found in [`FileBytes`].
+    early_end: Option<Reason>,
     /// As of a full disk or lost power.
     zero_bytes: u64,
     monitor: ReadMonitor,
@@ -77,6 +82,9 @@ impl Lines {
             latin: String::new(),
             is_latin: false,
             again: false,
+            unended: None,
+            damage: None,
+            early_end: file.cut().map(|format| Reason::Truncated { format }),
             zero_bytes: 0,
             monitor: monitor.clone(),
         })
@@ -93,14 +101,20 @@ impl Lines {
             let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
             let read = match read.map_err(read_failure) {
                 Ok(read) => read,
-                Err(Reason::TruncatedGzip) if self.monitor.is_cut() => 0,
+                Err(reason @ Reason::Truncated { .. }) => {
+                    self.early_end = Some(reason).filter(|_| !self.monitor.is_cut());
+                    0
+                }
                 Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
             };
-            // A stopped pipe may end within a line.
-            if read == 0 || (self.monitor.is_cut() && self.bytes.last() != Some(&b'\n')) {
+            let has_end = self.bytes.last() == Some(&b'\n');
+            // Stopped pipes and cut files may end within a line.
+            if read == 0 || (self.monitor.is_cut() || self.early_end.is_some()) && !has_end {
+                self.damage = self.early_end.take().or(self.damage.take());
                 self.monitor.end();
                 return Ok(None);
             }
+            self.unended = (!has_end).then(|| Unended::new(self.line, &self.bytes));
             if self.bytes.contains(&0) {
                 let length = self.bytes.len();
                 self.bytes.retain(|byte| *byte != 0);
@@ -108,7 +122,11 @@ impl Lines {
                 // The rest of a line of zeros follows.
                 self.line -= u64::from(self.bytes.is_empty());
             } else if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
-                return Err(InputError::line(&self.file, self.line, Reason::LongLine));
+                return Err(InputError::line(
+                    &self.file,
+                    self.line,
+                    Reason::other("the line is longer than 65536 bytes"),
+                ));
             }
             if !self.bytes.trim_ascii().is_empty() {
                 break;
@@ -121,7 +139,7 @@ impl Lines {
         // Control characters are no text.
         let latin = self.bytes.trim_ascii().iter().map(|byte| char::from(*byte));
         if latin.clone().any(|letter| letter.is_control() && letter != '\t') {
-            return Err(InputError::line(&self.file, self.line, Reason::NotText));
+            return Err(InputError::line(&self.file, self.line, Reason::other("not text in UTF-8 or Latin-1")));
         }
         self.latin.clear();
         self.latin.extend(latin);
@@ -129,9 +147,28 @@ impl Lines {
         Ok(Some((self.line, &self.latin)))
     }
 
-    /// In memory; empty if not readable.
-    pub(crate) fn buffer(&mut self) -> &[u8] {
-        if self.again { &[] } else { self.input.fill_buf().unwrap_or_default() }
+    /// In memory; may be empty before the end.
+    pub(crate) fn buffer(&self) -> &[u8] {
+        if self.again { &[] } else { self.input.buffer() }
+    }
+
+    /// The last line, if it is `line` and has no line end.
+    pub(crate) fn unended(&self, line: u64) -> Option<Unended> {
+        self.unended.filter(|last| last.line == line)
+    }
+
+    /// True if the text ends within `line`, which is no row; that is [damage](Self::take_damage).
+    pub fn ends_within(&mut self, line: u64) -> bool {
+        let is_cut = self.unended(line).is_some();
+        if is_cut {
+            self.damage = Some(Reason::Truncated { format: "text" });
+        }
+        is_cut
+    }
+
+    /// The reason for an early end, at the end.
+    pub fn take_damage(&mut self) -> Option<Reason> {
+        self.damage.take()
     }
 
     /// With its end; returns its number.
@@ -154,6 +191,22 @@ impl Lines {
         let found = self.next_line()?.is_some();
         self.again = found;
         Ok(found.then_some(if self.is_latin { self.latin.as_str() } else { text(&self.bytes).unwrap_or_default() }))
+    }
+}
+
+/// A last line without line end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Unended {
+    line: u64,
+    pub(crate) first: u8,
+    pub(crate) is_in_quotes: bool,
+}
+
+impl Unended {
+    fn new(line: u64, text: &[u8]) -> Self {
+        let first = text.trim_ascii().first().copied().unwrap_or_default();
+        let marks = text.iter().filter(|byte| **byte == b'"').count();
+        Self { line, first, is_in_quotes: marks % 2 == 1 }
     }
 }
 
@@ -180,10 +233,9 @@ fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
 
 fn read_failure(error: io::Error) -> Reason {
     match error.kind() {
-        io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
-        io::ErrorKind::InvalidInput => Reason::DamagedGzip(error),
-        io::ErrorKind::InvalidData => Reason::TrailingBytes,
-        _ => Reason::from_io(error),
+        io::ErrorKind::InvalidInput => Reason::other(format!("damaged gzip: {error}")),
+        io::ErrorKind::InvalidData => Reason::other("bytes after the end of the gzip data that are no gzip data"),
+        _ => Reason::ended("gzip", error),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::input::input_error::{InputError, Reason};
 use std::fs::{self, File};
-use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::NamedTempFile;
@@ -13,6 +13,8 @@ pub struct FileBytes {
     name: PathBuf,
     /// `None` for the file itself.
     copy: Option<BytesCopy>,
+    /// Compression whose data end early, so that these bytes do.
+    cut: Option<&'static str>,
 }
 
 #[derive(Debug, Clone)]
@@ -23,7 +25,7 @@ enum BytesCopy {
 
 impl<P: AsRef<Path> + ?Sized> From<&P> for FileBytes {
     fn from(file: &P) -> Self {
-        Self { name: file.as_ref().to_owned(), copy: None }
+        Self { name: file.as_ref().to_owned(), copy: None, cut: None }
     }
 }
 
@@ -36,25 +38,34 @@ impl From<&Self> for FileBytes {
 impl FileBytes {
     /// Bytes in memory that are called `name`.
     pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Self {
-        Self { name: name.to_owned(), copy: Some(BytesCopy::Memory(bytes.into())) }
+        Self { name: name.to_owned(), copy: Some(BytesCopy::Memory(bytes.into())), cut: None }
     }
 
     /// The bytes of a temporary file.
     pub fn in_temporary_file(name: &Path, file: NamedTempFile) -> Self {
-        Self { name: name.to_owned(), copy: Some(BytesCopy::File(Arc::new(file))) }
+        Self { name: name.to_owned(), copy: Some(BytesCopy::File(Arc::new(file))), cut: None }
     }
 
-    /// In a temporary file if possible.
-    pub(crate) fn copied(name: &Path, mut input: impl Read) -> io::Result<Self> {
+    /// Perhaps decompressed from `compression`, in a temporary file if possible; up to its early end.
+    pub(crate) fn copied(name: &Path, mut input: impl Read, compression: &'static str) -> io::Result<Self> {
+        let cut = |copied: io::Result<_>| match copied {
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(Some(compression)),
+            copied => copied.map(|_| None),
+        };
         if cfg!(target_family = "wasm") {
             let mut bytes = Vec::new();
-            input.read_to_end(&mut bytes)?;
-            return Ok(Self::in_memory(name, bytes));
+            let cut = cut(input.read_to_end(&mut bytes).map(|read| read as u64))?;
+            return Ok(Self { cut, ..Self::in_memory(name, bytes) });
         }
         let mut copy = NamedTempFile::new()?;
-        io::copy(&mut input, &mut copy)?;
+        let cut = cut(io::copy(&mut input, &mut copy))?;
         copy.flush()?;
-        Ok(Self::in_temporary_file(name, copy))
+        Ok(Self { cut, ..Self::in_temporary_file(name, copy) })
+    }
+
+    /// The compression whose data end early.
+    pub(crate) fn cut(&self) -> Option<&'static str> {
+        self.cut
     }
 
     /// As the user named it.

@@ -1,7 +1,8 @@
 //! Zstandard, all frames.
 
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
-use std::io::{self, BufRead, Read};
+use std::error::Error;
+use std::io::{self, BufRead, ErrorKind, Read};
 
 /// RFC 8878, 3.1.1.
 pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
@@ -36,18 +37,31 @@ impl<R: BufRead> ZstdFrames<R> {
                 self.input = Some(input);
                 continue;
             }
-            self.frame = Some(StreamingDecoder::new(input).map_err(io::Error::other)?);
+            let frame = StreamingDecoder::new(input);
+            self.frame = Some(frame.map_err(|error| ended_early(&error).unwrap_or_else(|| io::Error::other(error)))?);
             return Ok(true);
         }
         Ok(false)
     }
 }
 
+/// `UnexpectedEof` if that is the cause of `error`.
+fn ended_early(error: &(dyn Error + 'static)) -> Option<io::Error> {
+    let is_end = |error: &io::Error| error.kind() == ErrorKind::UnexpectedEof;
+    // An `io::Error` has the source of the error inside of it.
+    let inner =
+        error.downcast_ref::<io::Error>().and_then(io::Error::get_ref).map(|inner| inner as &(dyn Error + 'static));
+    let mut causes = std::iter::successors(inner.or(Some(error)), |&error| error.source());
+    causes.any(|cause| cause.downcast_ref().is_some_and(is_end)).then(|| ErrorKind::UnexpectedEof.into())
+}
+
 impl<R: BufRead> Read for ZstdFrames<R> {
+    /// # Errors
+    /// `UnexpectedEof` if the data end early.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             if let Some(frame) = &mut self.frame {
-                let read = frame.read(buffer)?;
+                let read = frame.read(buffer).map_err(|error| ended_early(&error).unwrap_or(error))?;
                 if read > 0 || buffer.is_empty() {
                     return Ok(read);
                 }

@@ -2,7 +2,7 @@
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
-use crate::inspection::time_unit::time_unit;
+use crate::rows::batch::usual_unit;
 use crate::rows::quantizer::{difference_noise, step};
 use crate::rows::whole_table::WholeColumn;
 
@@ -100,4 +100,24 @@ impl<'a> ColumnFacts<'a> {
         let all = is_increasing && self.values.iter().all(is_index);
         all.then(|| self.values.iter().map(|value| *value as u64).collect())
     }
+}
+
+/// Rates that tell the unit of times; the likeliest first, Hz.
+const LIKELY_HZ: [std::ops::RangeInclusive<f64>; 2] = [10.0..=10_000.0, 0.2..=40_000.0];
+
+pub(crate) fn time_unit(times: &[f64]) -> Option<(Unit, String)> {
+    let finite: Vec<f64> = times.iter().copied().filter(|time| time.is_finite()).collect();
+    let (origin, last) = (*finite.first()?, *finite.last()?);
+    let since: Vec<f64> = finite.iter().map(|time| time - origin).collect();
+    if let Some(unit) = usual_unit(&since, origin) {
+        return Some((unit, String::new()));
+    }
+    let interval = (last - origin) / (finite.len().max(2) - 1) as f64;
+    let units = ["ms", "us", "ns"].into_iter().filter_map(Unit::parse);
+    let unit_of = |rates: &std::ops::RangeInclusive<f64>| {
+        units.clone().find(|unit| rates.contains(&(interval * unit.factor).recip()))
+    };
+    let unit = LIKELY_HZ.iter().find_map(unit_of)?;
+    let hz = (interval * unit.factor).recip();
+    Some((unit, format!("a step of {interval:.4} in {} is {hz:.2} Hz", unit.name)))
 }

@@ -1,13 +1,12 @@
 //! Inertial columns by format, names or numbers.
 
-use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, ColumnSelection, known_by_name};
 use crate::columns::unit::{COUNT, SECOND, Unit};
-use crate::inspection::column_facts::ColumnFacts;
-use crate::inspection::time_unit::time_unit;
+use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::inspection::column_facts::{ColumnFacts, time_unit};
 use crate::inspection::unit_guess::{self, UnitGuess};
 use crate::rows::batch::usual_unit;
-use crate::rows::whole_table::{WholeSensor, WholeTable};
+use crate::rows::whole_table::{TopicSensor, WholeTable};
 use measurement::SensorProfile;
 use std::collections::BTreeMap;
 use time_base::TimeRange;
@@ -121,7 +120,7 @@ impl SensorGuess {
         Some(Self::new("", Evidence::User, columns)).filter(Self::is_inertial)
     }
 
-    fn of_format(sensor: &WholeSensor, facts: &[ColumnFacts]) -> Self {
+    fn of_format(sensor: &TopicSensor, facts: &[ColumnFacts]) -> Self {
         let column = |&(channel, at, unit): &(&'static str, usize, Option<Unit>)| {
             (channel, at, unit.or(facts[at].column.unit), "")
         };
@@ -366,36 +365,14 @@ impl RowLabel {
     }
 }
 
-const OTHER_NAMES: [&str; 22] = [
-    "lat",
-    "lon",
-    "alt",
-    "easting",
-    "northing",
-    "quality",
-    "yaw",
-    "pitch",
-    "roll",
-    "heading",
-    "speed",
-    "press",
-    "humid",
-    "volt",
-    "current",
-    "batt",
-    "covariance",
-    "orientation",
-    "quat",
-    "magnetic",
-    "position",
-    "temp",
-];
+const OTHER_NAMES: &str = "lat lon alt easting northing quality yaw pitch roll heading speed press humid volt current batt covariance \
+    orientation quat magnetic position temp";
 
 /// By name and unit.
 fn may_be_inertial(column: &AvailableColumn) -> bool {
     let name = column.name.to_lowercase();
     let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));
-    unit && !OTHER_NAMES.iter().any(|other| name.contains(other))
+    unit && !OTHER_NAMES.split(' ').any(|other| name.contains(other))
 }
 
 /// Over the longest.

@@ -264,7 +264,7 @@ impl BatchBuilder {
                         let is_passed =
                             |size: &&u64| before_own < **size && (**size - before_own) + own <= **size / MOST_MISSING;
                         let Some(size) = COUNTERS.iter().find(is_passed) else {
-                            return fault(position, Reason::IndexBackwards { before, now });
+                            return fault(position, Reason::other(format!("sample {now} does not follow {before}")));
                         };
                         self.index_offset += size;
                         index = Some(now + size);
@@ -405,7 +405,10 @@ impl BatchBuilder {
         }
         let Some((row, by)) = self.first_backwards else { return Ok(None) };
         if self.backwards as f64 > MAX_BACKWARDS * self.rows as f64 {
-            return Err(Reason::ClockSetBack { row, by, rows: self.backwards });
+            let rows = self.backwards;
+            return Err(Reason::other(format!(
+                "the time goes back before row {row} by {by} of its units, and {rows} rows are earlier than one before them"
+            )));
         }
         Ok(Some(format!("{} rows whose time goes back are left out, the first of them row {row}", self.backwards)))
     }
@@ -421,7 +424,7 @@ fn check_count(number: Number, (low, high): (i16, i16)) -> Result<(), Reason> {
         Number::Real(value) => return Err(Reason::NotInteger(value.to_string())),
     };
     let is_in_field = (i64::from(low)..=i64::from(high)).contains(&value);
-    if is_in_field { Ok(()) } else { Err(Reason::OutOfField { value, low, high }) }
+    if is_in_field { Ok(()) } else { Err(Reason::other(format!("{value} is outside {low}..={high}"))) }
 }
 
 fn empty(columns: usize) -> Batch {

@@ -2,9 +2,8 @@
 
 use crate::columns::column_selection::{ChosenColumn, Role};
 use crate::input::budget::Budget;
-use crate::input::input_error::{InputError, Reason};
+use crate::input::input_error::{InputError, Reason, StreamError};
 use crate::input::read_monitor::ReadMonitor;
-use crate::input::stream_error::StreamError;
 use crate::rows::batch::{Batch, BatchBuilder, HELD_ROWS, Number, RegisterField, RowFault, ValueColumn, usual_unit};
 use std::path::Path;
 use time_base::TimeBaseError;
@@ -25,8 +24,19 @@ pub(crate) enum Refusal {
 
 #[derive(Debug, Default)]
 pub(crate) struct Ending {
-    pub(crate) damage: Option<String>,
+    /// The source ends early.
+    pub(crate) damage: Option<Reason>,
     pub(crate) notes: Vec<String>,
+}
+
+impl Ending {
+    /// A sentence on the damage behind `rows`, which are `used`; an error without any, and for a limit.
+    pub(crate) fn told(&mut self, file: &Path, rows: u64, used: &str) -> Result<Option<String>, InputError> {
+        match self.damage.take() {
+            Some(reason) if rows == 0 || reason.is_limit() => Err(InputError::file(file, reason)),
+            damage => Ok(damage.map(|reason| format!("{reason}; the {rows} rows before that are {used}"))),
+        }
+    }
 }
 
 pub(crate) trait RowSource: Send {
@@ -36,9 +46,11 @@ pub(crate) trait RowSource: Send {
     fn rate_hz(&self) -> Option<f64>;
 
     /// If rows can exceed bytes.
-    fn budget(&self) -> Option<Budget>;
+    fn budget(&self) -> Option<Budget> {
+        None
+    }
 
-    /// All rows until a refusal.
+    /// All rows until a refusal, once.
     ///
     /// # Errors
     /// The file is damaged, or a row is at fault.
@@ -248,15 +260,15 @@ impl<'a> FileRows<'a> {
         if let Some(error) = delivery.error.take() {
             return Err(error);
         }
-        let Ending { damage, notes } = ending?;
+        let mut ending = ending?;
+        let damage = ending.told(file, delivery.builder.rows(), "used")?;
         is_stopped |= monitor.is_cut();
         delivery.finish(file)?;
         let backwards = delivery.builder.backwards().map_err(|reason| InputError::file(file, reason))?;
         let rows = delivery.builder.rows();
         let mut notes_of_rows: Vec<String> =
             backwards.into_iter().chain(delivery.builder.notes()).chain(delivery.notes).collect();
-        notes_of_rows.extend(notes);
-        let damage = damage.map(|damage| format!("{damage}; the {rows} rows before that are used"));
+        notes_of_rows.extend(ending.notes);
         let outside = delivery.filter.rows.saturating_sub(delivery.filter.kept);
         Ok(RowsRead { rows, outside, padding: 0, is_stopped, damage, notes: notes_of_rows })
     }

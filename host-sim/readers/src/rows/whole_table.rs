@@ -4,7 +4,8 @@ use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
 use crate::columns::unit::Unit;
 use crate::input::input_error::InputError;
 use crate::rows::batch::BatchBuilder;
-use crate::rows::row_source::{Ending, Refusal, RowSource};
+use crate::rows::row_source::{Refusal, RowSource};
+use std::path::Path;
 
 /// 128 MiB.
 const MOST_VALUES: u64 = 1 << 24;
@@ -23,12 +24,27 @@ pub(crate) struct WholeColumn {
     pub(crate) values: Vec<f64>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct WholeSensor {
-    /// May be empty.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct TopicSensor {
+    /// Empty for the only one.
     pub(crate) name: String,
-    /// Channel, `time` or `sample`; position; stated unit.
+    /// Channel, `time` or `sample`; position; unit if the column lacks it.
     pub(crate) columns: Vec<(&'static str, usize, Option<Unit>)>,
+    /// Reason of unstated units.
+    pub(crate) note: Option<String>,
+}
+
+impl TopicSensor {
+    /// True if it has the channel.
+    pub(crate) fn has(&self, channel: &str) -> bool {
+        self.columns.iter().any(|(name, ..)| *name == channel)
+    }
+
+    /// In `unit`.
+    pub(crate) fn add_axes(&mut self, channels: [&'static str; 3], positions: [usize; 3], unit: &str) {
+        let unit = Unit::parse(unit);
+        self.columns.extend(channels.into_iter().zip(positions).map(|(channel, at)| (channel, at, unit)));
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -38,7 +54,7 @@ pub(crate) struct WholeTable {
     /// May be empty.
     pub(crate) kind: String,
     pub(crate) columns: Vec<WholeColumn>,
-    pub(crate) sensors: Vec<WholeSensor>,
+    pub(crate) sensors: Vec<TopicSensor>,
     /// Arrays of perhaps several groups.
     pub(crate) is_of_arrays: bool,
     /// Stated, Hz.
@@ -51,7 +67,7 @@ pub(crate) struct WholeTable {
 
 impl WholeTable {
     /// Columns as they are; an error if no row can be read.
-    pub(crate) fn read(mut self, source: &mut dyn RowSource) -> Result<Self, InputError> {
+    pub(crate) fn read(mut self, file: &Path, source: &mut dyn RowSource) -> Result<Self, InputError> {
         let chosen = source.chosen().to_vec();
         let most = most_rows(chosen.len());
         let mut builder = BatchBuilder::new(&chosen, &[], source.budget());
@@ -61,15 +77,15 @@ impl WholeTable {
             if is_cut { Err(Refusal::Enough) } else { builder.push(row).map_err(Refusal::Fault) }
         });
         let damage = match read {
-            Ok(Ending { damage, notes }) => {
-                self.notes.extend(notes);
-                damage
+            Ok(mut ending) => {
+                self.notes.append(&mut ending.notes);
+                ending.told(file, builder.rows(), "shown")?
             }
             Err(error) if builder.rows() == 0 || error.reason.is_limit() => return Err(error),
-            Err(error) => Some(error.to_string()),
+            Err(error) => Some(format!("{error}; the {} rows before that are shown", builder.rows())),
         };
         self.is_damaged = damage.is_some();
-        self.notes.extend(damage.map(|damage| format!("{damage}; the {} rows before that are shown", builder.rows())));
+        self.notes.extend(damage);
         let column = |(chosen, values): (ChosenColumn, Vec<f64>)| WholeColumn {
             column: AvailableColumn { name: chosen.label, unit: chosen.unit },
             values,

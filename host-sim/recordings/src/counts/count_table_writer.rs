@@ -28,15 +28,20 @@ pub fn write(recording: &Recording, file: &Path) -> io::Result<()> {
 }
 
 /// Writes a text, gzip if the name of `file` ends in `.gz`.
-pub(crate) fn write_text(file: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+pub(crate) fn write_text<T, E: From<io::Error>>(
+    file: &Path,
+    write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
+) -> Result<T, E> {
     let mut out = BufWriter::new(File::create(file)?);
     if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz")) {
-        let mut out = GzEncoder::new(out, Compression::default());
-        write(&mut out)?;
-        out.finish()?.flush()
+        let mut gzip = GzEncoder::new(out, Compression::default());
+        let written = write(&mut gzip)?;
+        gzip.finish()?.flush()?;
+        Ok(written)
     } else {
-        write(&mut out)?;
-        out.flush()
+        let written = write(&mut out)?;
+        out.flush()?;
+        Ok(written)
     }
 }
 

@@ -2,12 +2,11 @@
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use readers::delimited_text::{self, Lines};
-use readers::{FileBytes, InputError, Reason};
+use readers::{Reason, delimited_text};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// First line of every log.
@@ -18,9 +17,7 @@ const MAX_DELAY: Duration = Duration::from_secs(1);
 const MAX_BUFFERED: usize = 1 << 22;
 const CLOCK_BYTES: usize = 1 << 12;
 
-const TIME: &str = "time_s";
-const MOSI: &str = "mosi";
-const MISO: &str = "miso";
+pub(crate) const TIME: &str = "time_s";
 
 /// One SPI transaction.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,86 +28,35 @@ pub struct Frame {
     pub miso: Vec<u8>,
 }
 
-/// An open log, read frame by frame.
-pub struct FrameLogReader {
-    file: PathBuf,
-    lines: Lines,
-    line: u64,
-    last_s: f64,
-}
+/// Column and reason.
+pub(crate) type Fault = (Option<&'static str>, Reason);
 
-impl FrameLogReader {
-    /// Opens a log, plain or gzip.
-    ///
-    /// # Errors
-    /// The file cannot be read or does not start with [`HEADER`].
-    pub fn open(file: impl Into<FileBytes>) -> Result<Self, InputError> {
-        let file = file.into();
-        Self::new(file.name(), Lines::open(&file)?)
-    }
-
-    pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
-        match lines.next_line()? {
-            None => Err(InputError::file(file, Reason::Empty)),
-            Some((_, HEADER)) => Ok(Self { file: file.to_owned(), lines, line: 1, last_s: f64::NEG_INFINITY }),
-            Some((line, _)) => Err(InputError::line(file, line, Reason::NotFrameLog)),
-        }
-    }
-
-    /// Line of the frame that was read last, from 1.
-    pub fn line(&self) -> u64 {
-        self.line
-    }
-
-    /// The next frame; `None` at the end of the log.
-    ///
-    /// # Errors
-    /// A line does not have a finite time, not before that of the last line, and two equally long rows of 16-bit words.
-    #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
-    pub fn next(&mut self) -> Result<Option<Frame>, InputError> {
-        let Some((line, text)) = self.lines.next_line()? else {
-            return Ok(None);
-        };
-        let frame = parse(text, self.last_s).map_err(|(column, reason)| match column {
-            Some(column) => InputError::field(&self.file, line, column, reason),
-            None => InputError::line(&self.file, line, reason),
-        })?;
-        self.line = line;
-        self.last_s = frame.time_s;
-        Ok(Some(frame))
-    }
-}
-
-fn parse(text: &str, last_s: f64) -> Result<Frame, (Option<&'static str>, Reason)> {
+/// A line of a log; its time may go back.
+pub(crate) fn parse(text: &str) -> Result<Frame, Fault> {
     let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
     let &[time, mosi, miso] = fields.as_slice() else {
         return Err((None, Reason::FieldCount { found: fields.len(), expected: 3 }));
     };
     let time_s = delimited_text::time(time).map_err(|reason| (Some(TIME), reason))?;
-    if time_s < last_s {
-        return Err((Some(TIME), Reason::TimeBackwards { before: last_s, now: time_s }));
-    }
-    let mosi = bytes(mosi).map_err(|reason| (Some(MOSI), reason))?;
-    let miso = bytes(miso).map_err(|reason| (Some(MISO), reason))?;
-    if mosi.len() != miso.len() {
-        return Err((None, Reason::UnequalLengths { mosi: mosi.len(), miso: miso.len() }));
-    }
-    if mosi.is_empty() || mosi.len() % 2 == 1 {
-        return Err((None, Reason::OddBytes(mosi.len())));
+    let mosi = bytes(mosi).map_err(|reason| (Some("mosi"), reason))?;
+    let miso = bytes(miso).map_err(|reason| (Some("miso"), reason))?;
+    if mosi.is_empty() {
+        return Err((None, Reason::other("0 bytes are no whole number of 16-bit words")));
     }
     Ok(Frame { time_s, mosi, miso })
 }
 
 pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
     let nibble = |digit: u8| (digit as char).to_digit(16).map(|value| value as u8);
-    if text.len() % 2 == 1 {
-        return Err(Reason::NotHex(delimited_text::quote(text)));
-    }
-    text.as_bytes()
-        .chunks_exact(2)
-        .map(|pair| Some(nibble(pair[0])? << 4 | nibble(pair[1])?))
-        .collect::<Option<Vec<u8>>>()
-        .ok_or_else(|| Reason::NotHex(delimited_text::quote(text)))
+    let pairs = text.as_bytes().chunks(2).map(|pair| match *pair {
+        [high, low] => Some(nibble(high)? << 4 | nibble(low)?),
+        _ => None,
+    });
+    pairs.collect::<Option<_>>().ok_or_else(|| not_hex(text))
+}
+
+pub(crate) fn not_hex(text: &str) -> Reason {
+    Reason::other(format!("{:?} is not a row of hexadecimal bytes", delimited_text::quote(text)))
 }
 
 /// A log being written, gzip for a name in `.gz`; complete up to the last second without [`finish`](Self::finish).

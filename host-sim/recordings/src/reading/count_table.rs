@@ -15,34 +15,30 @@ use time_base::TimeRange;
 /// The file cannot be read, or a row is at fault.
 pub fn read(file: impl Into<FileBytes>, range: GyroRange) -> Result<Recording, InputError> {
     let file = &file.into();
-    let mut rows = RecordedCounts::new(range);
-    for_each_row(file, range, |channels, row, counts| rows.push(channels, row, counts))?;
-    rows.finish(file)
+    recorded(file, range, |take| for_each_row(file, range, take))
 }
 
-/// Channels are known with the first row.
-struct RecordedCounts {
+/// The recording of the rows that `read` gives; an error without any.
+fn recorded<E: From<InputError>>(
+    file: &FileBytes,
     range: GyroRange,
-    recorder: Option<Recorder>,
-}
-
-impl RecordedCounts {
-    fn new(range: GyroRange) -> Self {
-        Self { range, recorder: None }
-    }
-
-    fn push(&mut self, channels: &[Channel], row: TimeStamp, counts: Counts) -> Result<(), Reason> {
-        let recorder = self.recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), self.range));
+    read: impl FnOnce(&mut TakeRow) -> Result<Option<String>, E>,
+) -> Result<Recording, E> {
+    // Channels are known with the first row.
+    let mut recorder: Option<Recorder> = None;
+    let damage = read(&mut |channels, row, counts| {
+        let recorder = recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), range));
         recorder.push(row, &Burst::from_counts(&counts));
         Ok(())
-    }
-
-    fn finish(self, file: &FileBytes) -> Result<Recording, InputError> {
-        self.recorder.map(Recorder::finish).ok_or_else(|| file.error(Reason::NoData))
-    }
+    })?;
+    let recording = recorder.map(Recorder::finish).ok_or_else(|| file.error(Reason::NoData))?;
+    Ok(Recording { damage, ..recording })
 }
 
-/// Calls `take` with the channels and each row: time stamp and counts, absent channels as in [`NOT_RECORDED`].
+type TakeRow<'a> = dyn FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason> + 'a;
+
+/// Calls `take` with the channels and each row: time stamp and counts, absent channels as in [`NOT_RECORDED`]. Returns
+/// the reason if the table ends early.
 ///
 /// # Errors
 /// As [`read`], and what `take` refuses.
@@ -50,15 +46,15 @@ pub fn for_each_row(
     file: impl Into<FileBytes>,
     range: GyroRange,
     take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
-) -> Result<(), InputError> {
+) -> Result<Option<String>, InputError> {
     let file = &file.into();
     let options = options_of_counts(range);
     let input = InputFile::recognised(file.name(), vec![file.clone()], &ReadMonitor::default())?;
-    match for_each_row_of(file_format::rows(&input, &options, true)?, WantedRows::all(None), file, take) {
-        Ok(()) => Ok(()),
-        Err(StreamError::Input(error)) => Err(error),
-        Err(StreamError::TimeBase(error)) => Err(file.error(Reason::Bus(error.to_string()))),
-    }
+    let rows = file_format::rows(&input, &options, true)?;
+    for_each_row_of(rows, WantedRows::all(None), file, take).map_err(|error| match error {
+        StreamError::Input(error) => error,
+        StreamError::TimeBase(error) => file.error(Reason::other(format!("replay over the bus: {error}"))),
+    })
 }
 
 /// The part of a table of counts, as [`read`].
@@ -71,14 +67,9 @@ pub fn read_part(
     part: Option<TimeRange>,
     stated_hz: Option<f64>,
 ) -> Result<Recording, StreamError> {
-    let read = || -> Result<Recording, StreamError> {
-        let source = input.rows(&options_of_counts(range), true)?;
-        let mut rows = RecordedCounts::new(range);
-        let wanted = WantedRows { part, ..WantedRows::all(stated_hz) };
-        for_each_row_of(source, wanted, input.bytes(), |channels, row, counts| rows.push(channels, row, counts))?;
-        Ok(rows.finish(input.bytes())?)
-    };
-    read()
+    let source = input.rows(&options_of_counts(range), true)?;
+    let wanted = WantedRows { part, ..WantedRows::all(stated_hz) };
+    recorded(input.bytes(), range, |take| for_each_row_of(source, wanted, input.bytes(), take))
 }
 
 fn for_each_row_of(
@@ -86,10 +77,10 @@ fn for_each_row_of(
     wanted: WantedRows,
     file: &FileBytes,
     mut take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
-) -> Result<(), StreamError> {
+) -> Result<Option<String>, StreamError> {
     let channels: Vec<Channel> = source.columns().iter().filter_map(channel).collect();
     let mut rows = 0u64;
-    for_each_batch(
+    let read = for_each_batch(
         |give| source.read(wanted, give),
         |batch: Batch| {
             for row in 0..batch.rows {
@@ -112,5 +103,5 @@ fn for_each_row_of(
             Ok(())
         },
     )?;
-    Ok(())
+    Ok(read.damage)
 }

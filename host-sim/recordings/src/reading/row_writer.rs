@@ -45,11 +45,9 @@ impl SensorRows<'_> {
     /// # Errors
     /// The rows cannot be read, or the file not written.
     pub fn write_table(&self, file: &Path) -> Result<WrittenRows, WriteError> {
-        let mut written = None;
-        let mut failure = None;
         write_text(file, |out| {
             let mut text = String::new();
-            let read = self.for_each_batch(|columns, batch, names| {
+            self.for_each_batch(|columns, batch, names| {
                 if names.is_empty() {
                     let stamps = [("sample", !batch.indices.is_empty()), ("time_s", !batch.times.is_empty())];
                     names.extend(stamps.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()));
@@ -72,15 +70,8 @@ impl SensorRows<'_> {
                     text.push('\n');
                 }
                 out.write_all(text.as_bytes())
-            });
-            match read {
-                Ok(read) => written = Some(read),
-                Err(WriteError::Write(error)) => return Err(error),
-                Err(error) => failure = Some(error),
-            }
-            Ok(())
-        })?;
-        failure.map_or_else(|| Ok(written.unwrap_or_else(WrittenRows::none)), Err)
+            })
+        })
     }
 
     /// Writes a NumPy array of doubles: time in s, if any, rad/s, m/s², others in the analysis' unit.
@@ -138,11 +129,5 @@ impl SensorRows<'_> {
         let is_complete = read.is_complete();
         let RowsRead { damage, notes, .. } = read;
         Ok(WrittenRows { columns: names, notes: notes.into_iter().chain(damage).collect(), is_complete })
-    }
-}
-
-impl WrittenRows {
-    fn none() -> Self {
-        Self { columns: Vec::new(), notes: Vec::new(), is_complete: true }
     }
 }

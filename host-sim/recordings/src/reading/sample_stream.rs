@@ -808,8 +808,7 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Estimate
 /// # Errors
 /// There is neither a time nor a rate, or no sample in the part.
 pub fn part_of(mut recording: Recording, part: TimeRange, stated_hz: Option<f64>) -> Result<Recording, TimeBaseError> {
-    let is_inside = RecordedRows::new(&recording).inside(part, stated_hz)?;
-    let mut is_inside = is_inside.into_iter();
-    recording.samples.retain(|_| is_inside.next().unwrap_or(false));
+    let inside = RecordedRows::new(&recording).inside(part, stated_hz)?;
+    recording.samples = inside.into_iter().map(|at| recording.samples[at]).collect();
     Ok(recording)
 }

