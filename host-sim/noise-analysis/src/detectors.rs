@@ -19,6 +19,7 @@
 pub(crate) mod bias;
 pub(crate) mod bias_response;
 mod bias_step;
+pub(crate) mod block_cosines;
 pub mod block_means;
 mod change_point;
 pub(crate) mod effective_lsb;
@@ -27,6 +28,7 @@ pub(crate) mod knock_search;
 pub(crate) mod knocks;
 pub(crate) mod level_change;
 mod level_wandering;
+mod log_levels;
 pub mod noise_grid;
 mod noise_levels;
 pub(crate) mod output_range;

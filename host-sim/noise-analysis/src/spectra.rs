@@ -20,7 +20,6 @@
 //! ```
 
 mod alternation;
-pub(crate) mod block_cosines;
 mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
@@ -29,6 +28,7 @@ pub(crate) mod epoch_spectra;
 mod equation_5;
 mod filtered_noise;
 pub(crate) mod force_regression;
+mod found_sine;
 mod found_sines;
 pub(crate) mod frequency_track;
 mod harmonics;
@@ -43,6 +43,7 @@ mod sample_likelihood;
 mod sample_spectrum;
 mod slow_background;
 mod smooth_shape;
+mod spectral_line;
 pub(crate) mod spectral_lines;
 pub(crate) mod stacked_spectrum;
 mod transforms;
@@ -59,6 +60,6 @@ pub(crate) use markov_spectrum::MarkovEstimate;
 pub(crate) use sample_likelihood::SpectrumBehindFilter;
 pub use sample_spectrum::SampleSpectrum;
 pub use smooth_shape::SpectralShape;
+pub use spectral_line::SpectralLine;
 pub use welch::Welch;
-pub use whitened_spectrum::SpectralLine;
 pub use whittle::SpectralBand;

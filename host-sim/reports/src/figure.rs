@@ -15,15 +15,7 @@ use channel::{allan_deviation_plot, measured, spectrum_plot};
 pub(crate) use evidence::evidence;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Report};
 pub(crate) use plot::Plot;
-use plot::{Line, Look, Panel, frames};
-
-const TAU: &str = "averaging time τ, s";
-/// Looks of the channels of one unit.
-const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
-
-fn deviation_label(unit: &str) -> String {
-    format!("Allan deviation σ(τ), {}", crate::rounding::unit(unit))
-}
+use plot::{COLOURS, LOOKS, Line, Look, Panel, TAU, deviation_label, frames};
 
 /// Growing curves of the channels with `prefix`; `None` without a point.
 pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
@@ -40,17 +32,6 @@ pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
     Some(Plot::new(format!("{prefix}live"), "Allan deviation, while the record grows", "", [panel]))
 }
 
-/// Class and colours of each [`Look`] on light and dark ground: contrast of at least 4.5:1.
-const COLOURS: [(&str, &str, &str); 8] = [
-    ("measured", "#1f5fa8", "#6cb2ff"),
-    ("second", "#a8480d", "#ffab5e"),
-    ("third", "#0b7559", "#3dd6ac"),
-    ("model", "#0b7559", "#3dd6ac"),
-    ("before", "#a8480d", "#ffab5e"),
-    ("term", "#75559f", "#bfa5ea"),
-    ("reference", "#5b6675", "#9aa7b8"),
-    ("followed", "#a8286b", "#ff8fc4"),
-];
 /// Rules of all else, with a colour on light and dark ground.
 const RULES: [(&str, &str, &str); 8] = [
     ("svg text{fill", "#1c2430", "#e6eaf0"),

@@ -39,6 +39,8 @@ pub(crate) const KINDS: [Kind; 13] = [
     ("pseudo-terminals", terminal),
 ];
 
+/// Exit codes of what reads a file: all of it, none of it, or not to its end.
+const READ: [i32; 3] = [0, 1, 3];
 /// Fraction of the intervals that contain the true value.
 const COVERAGE: f64 = 0.95;
 
@@ -105,7 +107,7 @@ impl Campaign {
 
     /// The report of a run, if it has one; its figures must be consistent.
     fn report(&mut self, run: &Run) -> Option<Value> {
-        if run.code != Some(0) {
+        if !matches!(run.code, Some(0 | 3)) {
             return None;
         }
         let report: Value = match serde_json::from_slice(&run.stdout) {
@@ -118,6 +120,9 @@ impl Campaign {
         if let Some(contradiction) = contradiction(&report) {
             self.fault(contradiction);
         }
+        if report["reading"]["complete"] != (run.code == Some(0)) {
+            self.fault(format!("exit code {:?}, complete: {}", run.code, report["reading"]["complete"]));
+        }
         Some(report)
     }
 
@@ -127,7 +132,7 @@ impl Campaign {
         let folder = self.folder().to_owned();
         let mut program = Program::new(&folder, &recorded.reading("analyze", &file));
         program.arguments.extend(["-o", "-"].map(str::to_owned));
-        let run = self.checked(&program, &[0, 1], recorded.bytes.len() as u64);
+        let run = self.checked(&program, &READ, recorded.bytes.len() as u64);
         self.report(&run)
     }
 
@@ -231,7 +236,7 @@ fn mutated_bytes(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let file = campaign.write(recorded.name, &recorded.bytes);
     let folder = campaign.folder().to_owned();
     // `inspect` must also refuse a file that is not a recording.
-    campaign.checked(&Program::new(&folder, &["inspect", &file]), &[0, 1], recorded.bytes.len() as u64);
+    campaign.checked(&Program::new(&folder, &["inspect", &file]), &READ, recorded.bytes.len() as u64);
 }
 
 /// Fields that are not valid numbers.
@@ -396,7 +401,7 @@ fn bomb(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let file = campaign.write(name, &bytes);
     let folder = campaign.folder().to_owned();
     for command in ["analyze", "inspect"] {
-        campaign.checked(&Program::new(&folder, &[command, &file]), &[0, 1], bytes.len() as u64);
+        campaign.checked(&Program::new(&folder, &[command, &file]), &READ, bytes.len() as u64);
     }
 }
 
@@ -443,7 +448,7 @@ fn nested(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let file = campaign.write(name, &bytes);
     let folder = campaign.folder().to_owned();
     for command in ["analyze", "inspect"] {
-        campaign.checked(&Program::new(&folder, &[command, &file]), &[0, 1], bytes.len() as u64);
+        campaign.checked(&Program::new(&folder, &[command, &file]), &READ, bytes.len() as u64);
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Levels of blocks of several lengths are compared with later ones; the length that shows it most measures it.
 
-use super::level_change::LogLevels;
+use super::log_levels::LogLevels;
 use super::noise_levels::{BlockLevels, DIFFERENCES};
 use super::telegraph_models::{gauss_markov_log_likelihood, gauss_markov_posterior};
 use crate::distributions::upper_tail;

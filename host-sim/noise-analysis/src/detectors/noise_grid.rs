@@ -3,8 +3,8 @@
 //! A mixture is one weight per order of the cosine transform. An unknown constant is order 0, which is left out. A block with
 //! fewer samples than the others has an additional error of its own, of unknown size where it has none.
 
+use super::block_cosines::{flicker_squares, walk_squares};
 use super::block_means::{BLOCKS, BlockMeans};
-use crate::spectra::block_cosines::{flicker_squares, walk_squares};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 use std::sync::{Arc, LazyLock, OnceLock};

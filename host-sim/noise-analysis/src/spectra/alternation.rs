@@ -3,7 +3,7 @@
 //! A periodogram has one degree of freedom there. The coefficient is the mean of `½(x₀ − x₁), ½(x₂ − x₃), …`; its error
 //! is that of the means of blocks.
 
-use super::whitened_spectrum::SpectralLine;
+use super::spectral_line::SpectralLine;
 use crate::bounds::MeasuredValue;
 use crate::distributions::student_tail;
 use crate::effects::findings::SIGNIFICANCE;

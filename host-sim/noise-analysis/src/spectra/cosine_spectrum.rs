@@ -6,10 +6,10 @@
 //! random walk, which does not. The expected square of each coefficient follows from the covariance of the block means
 //! (N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23, 1974).
 
-use super::block_cosines::{flicker_squares, markov_squares, walk_squares};
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
 use super::transforms::cosine_transform;
 use super::whittle::SpectralBand;
+use crate::detectors::block_cosines::{flicker_squares, markov_squares, walk_squares};
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use std::ops::Range;

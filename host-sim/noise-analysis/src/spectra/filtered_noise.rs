@@ -16,8 +16,8 @@ impl FilteredNoise {
         let count = samples_per_mean as f64;
         let reach = (f64::from(filter.stages) * f64::from(filter.taps) / filter.decimation / count).ceil() as u32;
         // Half the second difference of the variance of sums.
-        let sums: Vec<f64> =
-            (0..=reach + 1).map(|means| filter.sum_variance(count * f64::from(means), sample_period)).collect();
+        let mut sums = vec![0.0; reach as usize + 2];
+        filter.sum_variances(count, sample_period, &mut sums);
         let covariance = |lag: usize| (sums[lag + 1] - 2.0 * sums[lag] + sums[lag.abs_diff(1)]) / 2.0;
         let scale = sample_period / count;
         Self {

@@ -1,11 +1,10 @@
 //! The sinusoids taken out of a record, fitted together, and their changes over the record.
 
+use super::found_sine::FoundSine;
 use super::line_envelope::{MOST_PERIODS, Modulation, is_same};
 use super::line_models::Sine;
-use super::whitened_spectrum::{Resonance, SpectralLine};
-use crate::bounds::MeasuredValue;
+use super::spectral_line::{Resonance, SpectralLine};
 use crate::samples::uniform_series::UniformSeries;
-use std::f64::consts::PI;
 
 /// Refits of neighbouring sinusoids in turn.
 const REFITS: usize = 3;
@@ -18,16 +17,6 @@ const SKIRTS: f64 = 20.0;
 #[derive(Default)]
 pub(super) struct FoundSines {
     found: Vec<FoundSine>,
-}
-
-/// A sinusoid that stands out of the noise.
-#[derive(Clone, Copy)]
-pub(super) struct FoundSine {
-    pub sine: Sine,
-    /// Noise around it, unit²/Hz.
-    pub density: f64,
-    /// Probability of such a peak at any frequency, without lines.
-    pub p_value: f64,
 }
 
 impl FoundSines {
@@ -108,39 +97,6 @@ impl FoundSines {
             lines.push(SpectralLine { modulation, ..strongest.line(rest) });
         }
         lines
-    }
-}
-
-impl FoundSine {
-    /// Its ordinate over the noise.
-    pub(super) fn over_noise(&self, series: &UniformSeries) -> f64 {
-        self.sine.density(series) / self.density
-    }
-
-    /// As a line of the spectrum of `series`.
-    pub(super) fn line(&self, series: &UniformSeries) -> SpectralLine {
-        let (amplitude, ratio) = (self.sine.amplitude(), self.over_noise(series));
-        SpectralLine {
-            frequency: MeasuredValue {
-                value: self.sine.frequency,
-                error: 1.5f64.sqrt() / (PI * series.duration() * ratio.sqrt()),
-            },
-            deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
-            width: None,
-            statistic: 2.0 * ratio,
-            p_value: self.p_value,
-            shape_p_value: 1.0,
-            modulation: None,
-        }
-    }
-
-    /// True if a line at `frequency`, Hz, is distinct but near enough for a sideband.
-    fn is_near(&self, frequency: f64, duration: f64) -> bool {
-        (1.0..=MOST_PERIODS as f64 + 1.0).contains(&self.resolutions_from(frequency, duration))
-    }
-
-    fn resolutions_from(&self, frequency: f64, duration: f64) -> f64 {
-        (self.sine.frequency - frequency).abs() * duration
     }
 }
 

@@ -7,7 +7,6 @@
 use super::harmonics::nearest_multiple;
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
-use super::whitened_spectrum::SpectralLine;
 use super::whittle::{Sign, SpectralBand, fit_mixture};
 use crate::bounds::MeasuredValue;
 use crate::distributions::NORMAL_975;
@@ -41,13 +40,6 @@ const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
 /// Resolutions within which two frequencies are one.
 const SAME: f64 = 1.5;
 
-/// Distance of sidebands beyond the taper's side lobes, and largest difference of their distances, resolutions of a spectrum without phases.
-const LOBE_RESOLUTIONS: f64 = 2.5;
-const LEAST_SYMMETRIC: f64 = 0.5;
-/// Largest relative difference of equal sidebands, and in standard deviations.
-const SIDEBAND_RATIO: f64 = 0.25;
-const SIDEBAND_SIGMAS: f64 = 3.0;
-
 /// A periodic change of a line's amplitude or phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Modulation {
@@ -69,33 +61,6 @@ impl Modulation {
         let highest = highest_multiple(0.5 * self.statistic);
         let (multiple, distance) = nearest_multiple(distance.abs(), self.frequency.value, highest);
         distance < (SAME / duration).hypot(NORMAL_975 * (multiple - 1.0) * self.frequency.error)
-    }
-
-    /// The change of a sinusoid with two others equally far from it and equally strong, in a spectrum of this `resolution`, Hz, which has
-    /// no phases.
-    pub(super) fn by_sidebands(line: &SpectralLine, sides: [&SpectralLine; 2], resolution: f64) -> Option<Self> {
-        let [one, other] = sides;
-        let distances = sides.map(|side| (side.frequency.value - line.frequency.value) / resolution);
-        let is_beside = distances.iter().all(|distance| distance.abs() > LOBE_RESOLUTIONS);
-        let is_symmetric = distances.iter().sum::<f64>().abs() < LEAST_SYMMETRIC;
-        let mean = 0.5 * (one.deviation.value + other.deviation.value);
-        let error = one.deviation.error.hypot(other.deviation.error);
-        let difference = (one.deviation.value - other.deviation.value).abs();
-        let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
-        let are_sinusoids = [line, one, other].iter().all(|of| of.width.is_none());
-        // A sideband has half the depth.
-        let over_line = 2.0 / line.deviation.value;
-        let statistic = one.statistic + other.statistic;
-        (is_beside && is_symmetric && is_equal && are_sinusoids).then(|| Self {
-            frequency: MeasuredValue {
-                value: 0.5 * (one.frequency.value - other.frequency.value).abs(),
-                error: 0.5 * one.frequency.error.hypot(other.frequency.error),
-            },
-            depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
-            of_phase: false,
-            statistic,
-            with_multiples: statistic,
-        })
     }
 
     /// The clearest change of `sine` in `rest`; `None` if noise of `density`, unit²/Hz, or another line explains it.

@@ -5,11 +5,13 @@
 //! the sample rate has a [test of its own](super::alternation).
 
 use super::alternation::Alternation;
-use super::found_sines::{FoundSine, FoundSines, is_on_skirts};
+use super::found_sine::FoundSine;
+use super::found_sines::{FoundSines, is_on_skirts};
 use super::line_models::Sine;
 use super::periodogram::{PADDING, Periodogram};
-use super::spectral_lines::gain_of_mean;
-use super::whitened_spectrum::{Candidate, FEWEST_PERIODS, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
+use super::spectral_line::{Resonance, SpectralLine};
+use super::transforms::gain_of_mean;
+use super::whitened_spectrum::{Candidate, FEWEST_PERIODS, Spectrum, WhitenedSpectrum, refit};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::LN_2;

@@ -1,5 +1,6 @@
 //! The lines of a channel's spectrum as terms of a noise model. Peaks of a wandering line are merged.
 
+use super::transforms::gain_of_mean;
 use crate::bounds::MeasuredValue;
 use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
@@ -9,7 +10,7 @@ use allan_core::Model;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::term::{NoiseTerm, Resonance, Shape, Sinusoid};
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::SQRT_2;
 
 /// Relative distance of peaks of one line, if either has a width.
 const MERGE_DISTANCE: f64 = 0.03;
@@ -57,12 +58,6 @@ pub(crate) struct MergedLine {
 pub(crate) fn before_averaging(line: &MergedLine, width: f64, m: u64) -> MeasuredValue {
     let gain = gain_of_mean(line.frequency.value, width, m);
     MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
-}
-
-/// Gain of the mean of `m` samples over `width` s at `frequency`, Hz: `sin(πfw)/(m·sin(πfw/m))`.
-pub(super) fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
-    let (phase, m) = (PI * frequency * width, m as f64);
-    phase.sin() / (m * (phase / m).sin())
 }
 
 /// True if `line` is the alias of the faster line `of` at the period, s: at its frequency, as wide.
@@ -241,9 +236,10 @@ impl MergedLine {
 
 #[cfg(test)]
 mod tests {
-    use super::{find, gain_of_mean};
+    use super::find;
     use crate::samples::rounding::Rounding;
     use crate::samples::series::Series;
+    use crate::spectra::transforms::gain_of_mean;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

@@ -4,9 +4,9 @@
 //! as for all of the record; a resonance no larger.
 
 use super::alternation::Alternation;
-use super::line_envelope::Modulation;
 use super::lines::MOST;
-use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
+use super::spectral_line::{Resonance, SpectralLine};
+use super::whitened_spectrum::{NARROWEST, Spectrum, WhitenedSpectrum, refit};
 use crate::robust::median;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
@@ -127,7 +127,7 @@ fn with_modulations(mut rest: Vec<SpectralLine>, resolution: f64) -> Vec<Spectra
         let mut line = rest.remove(0);
         let mut sides =
             rest.iter().enumerate().flat_map(|(at, one)| rest[at + 1..].iter().map(move |other| [one, other]));
-        line.modulation = sides.find_map(|sides| Modulation::by_sidebands(&line, sides, resolution));
+        line.modulation = sides.find_map(|sides| line.modulation_by_sidebands(sides, resolution));
         rest.retain(|other| !line.has_sideband(other, 1.0 / resolution));
         lines.push(line);
     }

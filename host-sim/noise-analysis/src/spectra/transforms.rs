@@ -71,3 +71,9 @@ pub(super) fn cosine_transform(values: impl ExactSizeIterator<Item = f64>) -> Ve
     }
     by_order
 }
+
+/// Gain of the mean of `m` samples over `width` s at `frequency`, Hz: `sin(πfw)/(m·sin(πfw/m))`.
+pub(super) fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
+    let (phase, m) = (PI * frequency * width, m as f64);
+    phase.sin() / (m * (phase / m).sin())
+}

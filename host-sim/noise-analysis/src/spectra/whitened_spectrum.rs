@@ -1,10 +1,11 @@
 //! A spectrum over its background, and its peaks.
 
-use super::found_sines::FoundSine;
+use super::found_sine::FoundSine;
 use super::line_envelope::Modulation;
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, Filters, LocalLevel, WINDOW};
+use super::spectral_line::{Resonance, SpectralLine};
 use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
@@ -72,50 +73,9 @@ impl Spectrum {
     }
 }
 
-/// A line that stands out of the background.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpectralLine {
-    /// Hz.
-    pub frequency: MeasuredValue,
-    /// For the line's signal, in the unit of the series: 1/√2 of a sinusoid's amplitude.
-    pub deviation: MeasuredValue,
-    /// Full width at half maximum, Hz; `None` for a sinusoid.
-    pub width: Option<MeasuredValue>,
-    /// −2 log-likelihood ratio of the background against background and line.
-    pub statistic: f64,
-    /// Probability of such a peak at any frequency, without lines.
-    pub p_value: f64,
-    /// p-value as a resonance; 1 of a sinusoid.
-    pub shape_p_value: f64,
-    /// Periodic change of a line without a width; `None` if it may be constant.
-    pub modulation: Option<Modulation>,
-}
-
-impl SpectralLine {
-    /// Amplitude of the sinusoid; for a resonance, of a sinusoid of the same power.
-    #[must_use]
-    pub fn amplitude(&self) -> MeasuredValue {
-        let root = 2f64.sqrt();
-        MeasuredValue { value: root * self.deviation.value, error: root * self.deviation.error }
-    }
-
-    /// True if a weaker line is a sideband of this one in a record of `duration`, s.
-    pub(super) fn has_sideband(&self, other: &Self, duration: f64) -> bool {
-        let distance = other.frequency.value - self.frequency.value;
-        other.deviation.value < self.deviation.value
-            && self.modulation.is_some_and(|change| change.is_sideband(distance, duration))
-    }
-}
-
 pub(super) enum Candidate {
     Sine(FoundSine),
     Resonance(Resonance),
-}
-
-#[derive(Clone, Copy)]
-pub(super) struct Resonance {
-    pub line: SpectralLine,
-    pub lorentz: Lorentz,
 }
 
 /// A spectrum over its background.

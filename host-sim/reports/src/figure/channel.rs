@@ -1,8 +1,9 @@
 //! The figures of one channel: Allan deviation with its terms and its residual, spectrum, bias over time.
 
 use super::axis::{Axis, has_logarithm};
-use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, frames, heights, places};
-use super::{TAU, deviation_label};
+use super::plot::{
+    LEFT, Line, Look, Panel, Place, Plot, RIGHT, TAU, below_legend, deviation_label, frames, heights, places,
+};
 use crate::finding_text::channel_name;
 use crate::formatting::{capital, words};
 use crate::rounding::{NONE, extremes, quantity, span, unit};

@@ -1,9 +1,8 @@
 //! The picture of a finding's evidence: line, time, covariate, histogram, or residual.
 
-use super::LOOKS;
 use super::axis::Axis;
 use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
-use super::plot::{Line, Look, Panel, Place, Plot, below_legend, frames, heights};
+use super::plot::{LOOKS, Line, Look, Panel, Place, Plot, below_legend, frames, heights};
 use crate::finding_text::{channel_list, channel_name, shown_effects};
 use crate::formatting::words;
 use crate::rounding::{bounded_quantity, extremes, span, unit};

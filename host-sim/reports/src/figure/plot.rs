@@ -34,8 +34,30 @@ pub(super) enum Look {
 
 impl Look {
     pub(super) fn class(self) -> &'static str {
-        super::COLOURS[self as usize].0
+        COLOURS[self as usize].0
     }
+}
+
+/// Class and colours of each [`Look`] on light and dark ground: contrast of at least 4.5:1.
+pub(super) const COLOURS: [(&str, &str, &str); 8] = [
+    ("measured", "#1f5fa8", "#6cb2ff"),
+    ("second", "#a8480d", "#ffab5e"),
+    ("third", "#0b7559", "#3dd6ac"),
+    ("model", "#0b7559", "#3dd6ac"),
+    ("before", "#a8480d", "#ffab5e"),
+    ("term", "#75559f", "#bfa5ea"),
+    ("reference", "#5b6675", "#9aa7b8"),
+    ("followed", "#a8286b", "#ff8fc4"),
+];
+
+/// Title of an axis of averaging times.
+pub(super) const TAU: &str = "averaging time τ, s";
+/// Looks of the channels of one unit.
+pub(super) const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
+
+/// Title of an axis of Allan deviations in this unit.
+pub(super) fn deviation_label(unit: &str) -> String {
+    format!("Allan deviation σ(τ), {}", crate::rounding::unit(unit))
 }
 
 /// Values of one quantity along a panel.

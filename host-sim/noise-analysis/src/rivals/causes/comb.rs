@@ -1,6 +1,6 @@
 //! Lines that are one periodic signal: the harmonics of a fundamental, and sidebands where its amplitude or phase is modulated.
 
-use super::line::{Frequency, Line, NORMAL_995};
+use super::line::{Frequency, Line, NORMAL_995, Tooth};
 use super::waveform::{SQUARE_BY_CHANCE, by_channel, is_equal, is_square};
 use crate::spectra::nearest_multiple;
 
@@ -8,24 +8,6 @@ use crate::spectra::nearest_multiple;
 const BY_CHANCE: f64 = 0.01;
 /// By which part of the record's resolution lines that are a few resolutions apart move each other's frequency.
 const SHIFT_OF_NEIGHBOURS: f64 = 0.1;
-
-/// The place of a line in a comb: k·f₀ + j·Δ, with the frequency f₀ of the fundamental and Δ of the modulation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Tooth {
-    /// k, from 1 on.
-    pub harmonic: u32,
-    /// j, 0 at a harmonic.
-    pub sideband: i32,
-}
-
-impl Tooth {
-    pub(super) const FUNDAMENTAL: Self = Self { harmonic: 1, sideband: 0 };
-
-    /// The number of the harmonic; `None` of a sideband.
-    pub(super) fn multiple(self) -> Option<u32> {
-        (self.sideband == 0).then_some(self.harmonic)
-    }
-}
 
 /// The lines of one periodic signal, as positions in the list of frequencies, the fundamental first.
 pub(super) struct Comb {

@@ -8,6 +8,24 @@ use std::f64::consts::{PI, SQRT_2};
 /// Quantile of the normal distribution for a two-sided level of 1 %: equal frequencies are farther apart once in a hundred.
 pub(super) const NORMAL_995: f64 = 2.576;
 
+/// The place of a line in a comb: k·f₀ + j·Δ, with the frequency f₀ of the fundamental and Δ of the modulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Tooth {
+    /// k, from 1 on.
+    pub harmonic: u32,
+    /// j, 0 at a harmonic.
+    pub sideband: i32,
+}
+
+impl Tooth {
+    pub(super) const FUNDAMENTAL: Self = Self { harmonic: 1, sideband: 0 };
+
+    /// The number of the harmonic; `None` of a sideband.
+    pub(super) fn multiple(self) -> Option<u32> {
+        (self.sideband == 0).then_some(self.harmonic)
+    }
+}
+
 /// A line of one channel.
 #[derive(Clone)]
 pub(super) struct Line {

@@ -5,8 +5,8 @@
 //! effects of every channel ─► line (by frequency) ─► comb (which belong together) ─► waveform (what it is)
 //! ```
 
-use super::comb::{Comb, Tooth};
-use super::line::Frequency;
+use super::comb::Comb;
+use super::line::{Frequency, Tooth};
 use super::waveform::{by_channel, is_no_sinusoid, is_square, modulated_line, no_sinusoid, periodic, square_wave};
 use crate::effects::Effect;
 use crate::rivals::cause::{Cause, Shown};

@@ -1,7 +1,6 @@
 //! The form of a periodic signal by the amplitudes of its lines: a square wave, a modulated line, a sinusoid, or none of these.
 
-use super::comb::Tooth;
-use super::line::{Frequency, Line};
+use super::line::{Frequency, Line, Tooth};
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::upper_tail;
 use crate::effects::{
