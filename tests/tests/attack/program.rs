@@ -100,6 +100,7 @@ impl Run {
         match (code, lines.as_slice()) {
             (0, []) | (2, [_, ..]) => None,
             (0, _) => Some("messages of a run that succeeds".to_owned()),
+            (3, [warning]) if warning.starts_with("warning: ") => None,
             // An error has one line; or it is followed by the table of columns and a command, or, without a known
             // column, by the options that assign columns.
             (_, [error, rest @ ..])
