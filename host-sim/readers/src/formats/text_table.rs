@@ -118,6 +118,7 @@ impl TextTable {
             let Some((line, text)) = lines.next_line()? else { break };
             first.push((line, text.to_owned()));
         }
+        lines.begin_rows();
         let mut opened = Opened { file, choose, lines };
         let is_whole = first.len() < HEAD_LINES;
         let sentence = first.iter().position(|(_, text)| Sentence::parse(text).is_some());

@@ -26,6 +26,8 @@ pub struct Lines {
     is_latin: bool,
     /// The line in `bytes` comes again.
     again: bool,
+    /// True in rows: a damaged line is read as what it may be, and is no row.
+    are_rows: bool,
     /// The last line, if it has no line end.
     unended: Option<Unended>,
     damage: Option<Reason>,
@@ -82,6 +84,7 @@ impl Lines {
             latin: String::new(),
             is_latin: false,
             again: false,
+            are_rows: false,
             unended: None,
             damage: None,
             early_end: file.cut().map(|format| Reason::Truncated { format }),
@@ -93,7 +96,8 @@ impl Lines {
     /// The next non-blank line, trimmed, with its number from 1; Latin-1 unless UTF-8. `None` at the end.
     ///
     /// # Errors
-    /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or has control characters.
+    /// The file cannot be read or decompressed, or the line, [before rows](Self::begin_rows), is longer than 65536 bytes or has control
+    /// characters.
     pub fn next_line(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {
             self.line += 1;
@@ -121,7 +125,7 @@ impl Lines {
                 self.zero_bytes += (length - self.bytes.len()) as u64;
                 // The rest of a line of zeros follows.
                 self.line -= u64::from(self.bytes.is_empty());
-            } else if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
+            } else if read as u64 == MAX_LINE_BYTES && !has_end && !self.are_rows {
                 return Err(InputError::line(
                     &self.file,
                     self.line,
@@ -138,13 +142,18 @@ impl Lines {
         }
         // Control characters are no text.
         let latin = self.bytes.trim_ascii().iter().map(|byte| char::from(*byte));
-        if latin.clone().any(|letter| letter.is_control() && letter != '\t') {
+        if !self.are_rows && latin.clone().any(|letter| letter.is_control() && letter != '\t') {
             return Err(InputError::line(&self.file, self.line, Reason::other("not text in UTF-8 or Latin-1")));
         }
         self.latin.clear();
         self.latin.extend(latin);
         self.is_latin = true;
         Ok(Some((self.line, &self.latin)))
+    }
+
+    /// From here on all lines are rows, or damaged ones: one that is no text, or too long, costs itself alone.
+    pub(crate) fn begin_rows(&mut self) {
+        self.are_rows = true;
     }
 
     /// In memory; may be empty before the end.

@@ -145,16 +145,19 @@ impl SensorGuess {
         }
         // Times belong to all.
         let common = groups.remove("").unwrap_or_default();
-        let of_group = |(_, own): (&str, Vec<(&'static str, usize)>)| {
+        let mut groups: Vec<Vec<(&'static str, usize)>> = groups.into_values().collect();
+        // In the order of the table: by their names imu10 would precede imu2.
+        groups.sort_by_key(|own| own.first().map(|(_, at)| *at));
+        let of_group = |own: &Vec<(&'static str, usize)>| {
             let is_new = |(channel, _): &&(&'static str, usize)| !own.iter().any(|(known, _)| known == channel);
             let all =
-                common.iter().filter(|(channel, _)| matches!(*channel, "time" | "sample")).filter(is_new).chain(&own);
+                common.iter().filter(|(channel, _)| matches!(*channel, "time" | "sample")).filter(is_new).chain(own);
             let columns = all.map(|&(channel, at)| (channel, at, unit(at), "")).collect();
             Some(Self::new("", Evidence::Prefix, columns)).filter(Self::is_inertial)
         };
         let of_common = common.iter().map(|&(channel, at)| (channel, at, unit(at), "")).collect();
         let of_common = Some(Self::new("", Evidence::Prefix, of_common)).filter(Self::is_inertial);
-        of_common.into_iter().chain(groups.clone().into_iter().filter_map(of_group)).collect()
+        of_common.into_iter().chain(groups.iter().filter_map(of_group)).collect()
     }
 
     /// By name, or growing evenly.

@@ -136,6 +136,38 @@ fn a_recording_that_ends_early_is_read_up_to_there() {
     }
 }
 
+/// Bytes of any value in the middle, as of a lost sector, and a line without an end, as of a lost line feed. What is not a row costs itself.
+#[test]
+fn damage_within_a_table_costs_its_own_rows() {
+    const ROWS: usize = 3_000;
+    let mut noise = normal(6);
+    let mut row = |at: usize| format!("{:.2},{:.4},{:.4}\n", at as f64 / 100.0, noise(), noise());
+    let rows: Vec<String> = (0..ROWS).map(&mut row).collect();
+    let head = "time_s,gx [deg/s],gy [deg/s]\n";
+    let with = |middle: &[u8]| {
+        [head.as_bytes(), rows[..1_500].concat().as_bytes(), middle, rows[1_540..].concat().as_bytes()].concat()
+    };
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    // No line feed: the row behind the damage is part of it.
+    let mut sector = |length: usize| -> Vec<u8> { (0..length).map(|_| random.random_range(14..=255)).collect() };
+    for (name, middle) in
+        [("sector.csv", sector(512)), ("long.csv", sector(200_000)), ("controls.csv", vec![0x02; 100])]
+    {
+        let read = read(name, &with(&middle), &[""; 0]).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(read.samples.slots.len(), ROWS - 41, "{name}: {:?}", read.notes);
+        assert!(read.notes_contain("damaged rows are left out"), "{name}: {:?}", read.notes);
+        assert!(
+            read.notes.iter().all(|note| note.len() < 400 && !note.contains(char::is_control)),
+            "{name}: {:?}",
+            read.notes
+        );
+        assert_eq!((read.missing(), read.damage), (41, None), "{name}");
+    }
+    // A file that is no text is still refused.
+    let binary = read("binary.csv", &sector(4_000), &[""; 0]);
+    assert!(binary.is_err());
+}
+
 /// All that is decompressed before the end.
 fn started(mut input: impl Read) -> Vec<u8> {
     let mut bytes = Vec::new();

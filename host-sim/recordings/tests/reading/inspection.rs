@@ -116,20 +116,20 @@ fn the_part_at_rest_is_found() {
 }
 
 #[test]
-fn sensors_whose_names_begin_differently_have_a_proposal_each() {
+fn sensors_whose_names_begin_differently_have_a_proposal_each_in_the_order_of_the_table() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut normal = normal(15);
-    let names = |side: &str| ["x", "y", "z"].map(|axis| format!("{side}_gyro_{axis} [rad/s]")).join(",");
+    let names = |imu: &str| ["x", "y", "z"].map(|axis| format!("{imu}_gyro_{axis} [rad/s]")).join(",");
     let row = |row: u32| {
         let values = [(); 6].map(|()| format!("{:.6}", 0.002 * normal()));
         format!("{:.3},{}\n", f64::from(row) * 0.01, values.join(","))
     };
     let rows: String = (0..1000).map(row).collect();
-    let (file, table) = inspected(&folder, &format!("time_s,{},{}\n{rows}", names("left"), names("right")));
-    let sides: Vec<String> = table.proposals.iter().map(|proposal| proposal.columns.join(",")).collect();
-    let expected = ["left", "right"]
-        .map(|side| format!("time=time,gyro_x={side}_gyro_x,gyro_y={side}_gyro_y,gyro_z={side}_gyro_z"));
-    assert_eq!(sides, expected);
+    let (file, table) = inspected(&folder, &format!("time_s,{},{}\n{rows}", names("imu2"), names("imu10")));
+    let proposals: Vec<String> = table.proposals.iter().map(|proposal| proposal.columns.join(",")).collect();
+    let expected =
+        ["imu2", "imu10"].map(|imu| format!("time=time,gyro_x={imu}_gyro_x,gyro_y={imu}_gyro_y,gyro_z={imu}_gyro_z"));
+    assert_eq!(proposals, expected);
     for proposal in &table.proposals {
         assert_eq!(read_file(&file, &options(proposal)).expect("as proposed").samples.len(), 1000);
     }
