@@ -118,7 +118,9 @@ impl Lines {
                 self.monitor.end();
                 return Ok(None);
             }
-            self.unended = (!has_end).then(|| Unended::new(self.line, &self.bytes));
+            // A piece of a line that is too long is not the last one.
+            let is_last = !has_end && (read as u64) < MAX_LINE_BYTES;
+            self.unended = is_last.then(|| Unended::new(self.line, &self.bytes));
             if self.bytes.contains(&0) {
                 let length = self.bytes.len();
                 self.bytes.retain(|byte| *byte != 0);
