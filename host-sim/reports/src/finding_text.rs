@@ -53,7 +53,7 @@ impl FindingText {
 
 /// Sentences with places for numbers; see [`filled`].
 struct Template {
-    /// What stands between two [`DETAIL`]s is left out of the brief form.
+    /// The brief form leaves out the text between two [`DETAIL`]s.
     physics: String,
     /// The first step, [`DETAIL`], and the rest with the sign that ends the first.
     advice: String,

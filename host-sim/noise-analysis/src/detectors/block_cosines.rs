@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-/// Of orders 1 to `blocks` − 1, for means with this covariance at a lag in blocks; `blocks` is even.
+/// Expected squares of orders 1 to `blocks` − 1, for means with this covariance at a lag in blocks; `blocks` is even.
 pub(crate) fn expected_squares(blocks: usize, covariance: impl Fn(usize) -> f64) -> Vec<f64> {
     let cosines: Vec<f64> = (0..2 * blocks).map(|at| (PI * at as f64 / blocks as f64).cos()).collect();
     let cosine = |multiple: usize| cosines[multiple % cosines.len()];
@@ -20,25 +20,25 @@ pub(crate) fn expected_squares(blocks: usize, covariance: impl Fn(usize) -> f64)
     (1..blocks).map(of_order).collect()
 }
 
-/// Of flicker noise with B = 1.
+/// Expected squares of flicker noise with B = 1.
 pub(crate) fn flicker_squares(blocks: usize) -> Vec<f64> {
     expected_squares(blocks, flicker_covariance)
 }
 
-/// Of means of flicker noise with B = 1: −ln of the lag over π, up to a constant, which is in order 0 alone.
+/// Covariance of means of flicker noise with B = 1: −ln of the lag over π, up to a constant, which is in order 0 alone.
 fn flicker_covariance(lag: usize) -> f64 {
     let integral = |x: f64| if x == 0.0 { 0.0 } else { -0.5 * x * x * (x.abs().ln() - 1.5) / PI };
     let lag = lag as f64;
     integral(lag + 1.0) - 2.0 * integral(lag) + integral(lag - 1.0)
 }
 
-/// Of a random walk with steps of variance 1 per block: the eigenvalues of the covariance of its means.
+/// Expected squares of a random walk with steps of variance 1 per block: the eigenvalues of the covariance of its means.
 pub(crate) fn walk_squares(blocks: usize) -> Vec<f64> {
     let square = |order: usize| 0.25 / (PI * order as f64 / (2 * blocks) as f64).sin().powi(2) - 1.0 / 6.0;
     (1..blocks).map(square).collect()
 }
 
-/// Of a Gauss-Markov process of variance 1; time constant in blocks.
+/// Expected squares of a Gauss-Markov process of variance 1; time constant in blocks.
 pub(crate) fn markov_squares(blocks: usize, time: f64) -> Vec<f64> {
     let decay = |blocks: f64| (-blocks / time).exp();
     expected_squares(blocks, |lag| match lag {

@@ -7,7 +7,7 @@ use super::noise_levels::{BlockLevels, DIFFERENCES, SquaredDifferences, TRIMMED_
 use super::telegraph_models::gauss_markov_log_likelihood;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, student_tail};
-use crate::effects::findings::{REFUTED, SIGNIFICANCE};
+use crate::effects::findings::{REFUTED, SIGNIFICANCE, TOLD_APART};
 use crate::effects::{Effect, LevelChange};
 use crate::samples::series::Series;
 
@@ -15,8 +15,6 @@ use crate::samples::series::Series;
 const LEAST_EXPLAINED: f64 = 0.5;
 /// Least relative change of the deviation, as for a level that follows the temperature.
 const LEAST_CHANGE: f64 = 0.05;
-/// Likelihood ratio over an evenly rising and over a wandering level: 95 % if two of them are as frequent.
-const TOLD_APART: f64 = 19.0;
 /// Neighbouring differences share a sample: their squares correlate by 1/4 and count as two thirds.
 const FREEDOM: f64 = 2.0 / 3.0;
 

@@ -7,7 +7,7 @@ use super::noise_levels::{BlockLevels, DIFFERENCES};
 use super::telegraph_models::{gauss_markov_log_likelihood, gauss_markov_posterior};
 use crate::distributions::upper_tail;
 use crate::effects::WanderingLevel;
-use crate::effects::findings::SIGNIFICANCE;
+use crate::effects::findings::{SIGNIFICANCE, TOLD_APART};
 use std::ops::Range;
 
 /// Numbers of blocks of the lengths that are tried.
@@ -18,8 +18,6 @@ const APART: usize = 128;
 const APART_FROM_STRETCH: f64 = 0.1;
 /// Least relative standard deviation: two of them are apart as the levels of the least [change](super::level_change).
 const LEAST_DEVIATION: f64 = 0.025;
-/// Likelihood ratio over one change: 95 % if both are as frequent.
-const TOLD_APART: f64 = 19.0;
 
 /// By the levels of blocks of [`DIFFERENCES`], each of which begins `block_s` after the one before.
 pub(super) fn find(levels: &BlockLevels, block_s: f64) -> Option<WanderingLevel> {

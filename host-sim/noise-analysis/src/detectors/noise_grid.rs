@@ -35,7 +35,7 @@ static BASIS: LazyLock<DMatrix<f64>> = LazyLock::new(|| {
 
 /// The weights of all mixtures for one set of blocks.
 pub struct NoiseGrid {
-    /// Of the blocks with a mean.
+    /// The blocks that have a mean.
     basis: DMatrix<f64>,
     pub(super) mixtures: Vec<NoiseMixture>,
     steps: OnceLock<Regressors>,

@@ -6,7 +6,7 @@
 use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood, white_log_likelihood};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
-use crate::effects::findings::REFUTED;
+use crate::effects::findings::{REFUTED, TOLD_APART};
 use crate::effects::{Spikes, TelegraphEvidence, TelegraphNoise};
 use crate::robust::deviation_from_zero;
 use crate::samples::uniform_series::UniformSeries;
@@ -19,8 +19,6 @@ const RESOLVED: f64 = 20.0;
 const LEAST_GAIN: f64 = 12.0;
 /// Most parts in which two levels are compared with a Gaussian process: 3,000 correlation times.
 const COMPARED_PARTS: usize = 1 << 16;
-/// Likelihood ratio of a Gaussian process against a telegraph signal: 95 % if they are as frequent.
-pub(crate) const TOLD_APART: f64 = 19.0;
 /// Fewest jumps; one or two are steps of the bias.
 const FEWEST_JUMPS: f64 = 6.0;
 const LEAST_TIME: f64 = 4.0;

@@ -392,7 +392,7 @@ impl Filtered {
         Self { count, products, spreads: spreads.value() }
     }
 
-    /// Of values of mean 0, at the likeliest variance of the white noise.
+    /// The values have a mean of 0; the variance of the white noise is the likeliest one.
     fn log_likelihood(&self) -> f64 {
         independent_log_likelihood(self.count, self.products[0]) - 0.5 * self.spreads
     }

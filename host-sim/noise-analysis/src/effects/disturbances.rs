@@ -133,7 +133,7 @@ pub struct WanderingLevel {
     /// Time in which the correlation of the level falls to 1/e, s; at most the length of the record.
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
-    /// Of as high a correlation of the levels of blocks with later ones.
+    /// Probability of as high a correlation of the levels of blocks with later ones by chance.
     pub p_value: f64,
 }
 
@@ -146,7 +146,7 @@ impl Kind for WanderingLevel {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        // What the mean of a log-normal variance has more than its median: the model has the mean.
+        // The mean of a log-normal variance over its median: the model has the mean.
         let over_median = -(-2.0 * self.deviation.value.powi(2)).exp_m1();
         AddedVariance::modelled(over_median * at.model_avar)
     }

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 pub const SIGNIFICANCE: f64 = 2e-5;
 /// Highest probability that chance alone refutes a model or a shape that is true.
 pub const REFUTED: f64 = 2e-4;
+/// Likelihood ratio of two classes from which one of them is named: 95 % if they are as frequent.
+pub const TOLD_APART: f64 = 19.0;
 
 /// An effect by which a channel shows a cause.
 #[derive(Debug, Clone, PartialEq)]

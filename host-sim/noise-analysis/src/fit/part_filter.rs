@@ -99,7 +99,7 @@ struct JointSpectra<'a> {
     shown: Vec<bool>,
     /// Weights of the deviances; 0 of the channels that do not choose the filter.
     weights: Vec<f64>,
-    /// What a deviance must fall by to show a filter, and what it rises by up to the bounds.
+    /// Fall of a deviance that shows a filter, and its rise up to the bounds.
     required: f64,
     rise: f64,
 }
@@ -128,7 +128,7 @@ impl<'a> JointSpectra<'a> {
             let names = spectra.iter().zip(&shown).filter(|(_, shown)| **shown).map(|(channel, _)| channel.name);
             return Err(Unidentified::Minority(names.collect()));
         }
-        // Where the spectra of some channels are those behind a filter, the others say nothing of it.
+        // If a filter describes the spectra of some channels, the others say nothing of it.
         let is_showing = |at: usize| showing == 0 || shown[at];
         let is_described = |at: usize| is_showing(at) && chi_squared_tail(lowest[at], spectra[at].bands()) >= DESCRIBED;
         let one_is_described = (0..spectra.len()).any(is_described);
@@ -150,7 +150,7 @@ impl<'a> JointSpectra<'a> {
     fn low_pass_in_place_of(&self, averages: &Hypothesis, low_passes: &[TriedFamily]) -> Option<PartFilter> {
         let likeliest = low_passes.iter().map(|family| (family, family.likeliest(&self.weights)));
         let (family, low_pass) = likeliest.min_by(|(_, a), (_, b)| self.total(a).total_cmp(&self.total(b)))?;
-        // What neither of them describes scatters both deviances.
+        // A spectrum that neither of them describes scatters both deviances.
         let weights = weights(self.spectra, &lesser(self.lowest.clone(), &low_pass.deviances));
         let weights = weights.into_iter().zip(&self.weights).map(|(new, old)| if *old > 0.0 { new } else { 0.0 });
         let weights: Vec<f64> = weights.collect();
@@ -175,7 +175,7 @@ impl<'a> JointSpectra<'a> {
         let contradicted = chi_squared_quantile(1.0 - REFUTED, 1.0);
         let contradicting = self.spectra.iter().zip(&own).zip(&self.shown);
         let contradicting = contradicting.filter(|((_, (_, rise)), shown)| **shown && *rise > contradicted);
-        // Where the channels differ among themselves by more than chance, a common filter is known so much less.
+        // A common filter is known less by as much as the channels differ among themselves beyond chance.
         let used = own.iter().zip(&self.weights).filter(|(_, weight)| **weight > 0.0);
         let rises: Vec<f64> = used.map(|((_, rise), _)| *rise).collect();
         PartFilter {

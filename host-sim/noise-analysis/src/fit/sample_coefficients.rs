@@ -71,7 +71,7 @@ impl SamplesOfCurve<'_> {
         self.are_samples(curve).then(|| SampleSpectrum::of_samples(&self.rest.longest_interpolated(), lines))?
     }
 
-    /// Whether they are the samples of `curve` and not their means.
+    /// True if they are the samples of `curve` and not their means.
     fn are_samples(&self, curve: &Curve<OCTAVES>) -> bool {
         self.rest.sample_period() < 1.5 * curve.sample_period()
     }

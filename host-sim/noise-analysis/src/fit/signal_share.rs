@@ -177,7 +177,7 @@ mod tests {
         }
     }
 
-    /// Where one amplitude is at its lower bound and the other at its upper one, both are among those that are tried.
+    /// One amplitude at its lower bound beside the other at its upper one is among those that are tried.
     #[test]
     fn the_amplitudes_of_two_signals_are_tried_independently() {
         let of = |periodic: f64, run: f64| SignalShare {

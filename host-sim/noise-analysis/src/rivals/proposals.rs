@@ -3,8 +3,8 @@
 
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
-use crate::detectors::random_telegraph::{self, TOLD_APART, is_reversible};
-use crate::effects::findings::REFUTED;
+use crate::detectors::random_telegraph::{self, is_reversible};
+use crate::effects::findings::{REFUTED, TOLD_APART};
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, LineEvidence,
     LineSource, LinearDrift, LinearDriftEvidence, LowPassDesign, LowPassFilter, MarkovEvidence, MarkovProcess,

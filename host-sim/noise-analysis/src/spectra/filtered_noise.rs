@@ -4,6 +4,7 @@ use allan_core::term::{MovingAverageFilter, Process};
 use std::f64::consts::PI;
 
 /// White noise behind a filter, in samples or in means of several.
+#[derive(Clone)]
 pub(super) struct FilteredNoise {
     /// Covariance at each lag times the period, for a coefficient of 1.
     covariances: Vec<f64>,

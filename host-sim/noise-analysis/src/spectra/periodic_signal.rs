@@ -203,7 +203,7 @@ impl Ordinate {
         self.density - self.noise
     }
 
-    /// Of a power P over noise n, n² + 2nP.
+    /// Variance of an ordinate of the power P over noise n: n² + 2nP.
     fn variance(&self) -> f64 {
         self.noise * (self.noise + 2.0 * self.excess().max(0.0))
     }

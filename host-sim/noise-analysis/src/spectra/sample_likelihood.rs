@@ -220,7 +220,11 @@ impl<'a> Shapes<'a> {
             spectrum,
             all: noise.map(|kind| Shape::Term(*kind)).chain(rounding).collect(),
             filtered: filter.map(|filter| {
-                [1, spectrum.samples_per_mean].map(|of| FilteredNoise::new(&filter, spectrum.period, of))
+                let noise = |samples_per_mean| FilteredNoise::new(&filter, spectrum.period, samples_per_mean);
+                let samples = noise(1);
+                let means =
+                    if spectrum.samples_per_mean == 1 { samples.clone() } else { noise(spectrum.samples_per_mean) };
+                [samples, means]
             }),
             filter,
         }

@@ -144,7 +144,7 @@ pub(crate) fn is_read_slowly(kind: &NoiseTerm) -> bool {
 impl MergedLine {
     fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
         let strongest = peaks[0];
-        // What is left of sidebands is no part of the line between them.
+        // A rest of sidebands is no part of the line between them.
         let peaks = if strongest.modulation.is_some() { &peaks[..1] } else { peaks };
         let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
         let total: f64 = peaks.iter().map(power).sum();

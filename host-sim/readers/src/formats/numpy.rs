@@ -62,7 +62,7 @@ impl ArrayReader for NpyReader {
     fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop> {
         let columns: Vec<usize> = wanted.places.iter().map(|(_, column)| *column).collect();
         let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
-        // Of each column: its buffer.
+        // The buffer of each column.
         let last = buffers.len() - 1;
         let encoded: Vec<(usize, Encoded)> =
             columns.iter().enumerate().map(|(at, &column)| (at.min(last), self.layout.columns[column].1)).collect();

@@ -15,7 +15,7 @@ pub(crate) struct FilteredChannel<'a> {
     pub curve: &'a Curve<OCTAVES>,
     /// Its own model, whose terms beside the white noise it keeps.
     pub model: &'a Model,
-    /// Whether rounding adds white noise and nothing else. A channel that is not dithered says nothing of the filter.
+    /// True if rounding adds white noise and nothing else. A channel that is not dithered says nothing of the filter.
     pub is_dithered: bool,
     pub samples: SamplesOfCurve<'a>,
     /// Frequencies of lines in the spectrum, Hz.

@@ -27,7 +27,7 @@ pub(super) struct Hypothesis {
     pub(super) adjusted: f64,
     /// Between these the deviance has no other minimum.
     range: (f64, f64),
-    /// Of each channel.
+    /// One of each channel.
     pub(super) deviances: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ impl<'a> TriedFamily<'a> {
         self.tried.iter().map(|(_, deviances)| deviances.as_slice())
     }
 
-    /// Where the sum of the deviances, each times its weight, is least.
+    /// The filter with the least sum of the deviances, each times its weight.
     ///
     /// A reader that counts the values of the sensor has a whole decimation, at which the least deviance is a cusp: between two values of its
     /// clock a sensor gives the one before, and which one that is changes with time.
@@ -72,7 +72,7 @@ impl<'a> TriedFamily<'a> {
         Hypothesis { family: *family, adjusted, range, deviances }
     }
 
-    /// What is adjusted of a hypothesis, between the values at which the sum has risen by so much.
+    /// The decimation or frequency of a hypothesis, between the values at which the sum has risen by so much.
     pub(super) fn bounded(&self, of: &Hypothesis, weights: &[f64], rise: f64) -> BoundedEstimate {
         let behind = self.behind(of.adjusted);
         let bound = |end: f64| {
@@ -157,7 +157,7 @@ mod tests {
         ];
         let chosen = |nominal: f64| simplest(&tried, |of| of.total(&[1.0]), 4.0, nominal).map(|(at, _)| at);
         assert_eq!(chosen(1.003), Some(0));
-        // Where every second value is read, and where the clock is not known.
+        // Every second value is read, or the clock is not known.
         assert_eq!([chosen(2.006), chosen(0.0)], [Some(1), Some(1)]);
     }
 }

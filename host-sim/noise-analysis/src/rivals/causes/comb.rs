@@ -87,7 +87,7 @@ impl Lines<'_> {
             all.filter(|member| covered(member) < 1.0)
         };
         let own_width = self.frequencies[first].width();
-        // Where the frequency wanders, harmonic k shows it k times as well as the fundamental.
+        // Harmonic k shows a frequency that wanders k times as well as the fundamental.
         let harmonics = members(own_width).filter_map(|member| Some((member.tooth.multiple()?, member.number)));
         let width = harmonics.min_by_key(|(multiple, _)| *multiple).map_or(own_width, |(multiple, number)| {
             own_width.max(self.frequencies[number].width() / f64::from(multiple))
