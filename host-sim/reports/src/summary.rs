@@ -333,9 +333,13 @@ pub fn record_sentences(report: &Report) -> Vec<String> {
 
 /// Trust, rest and losses, error on the unseen half.
 pub(crate) fn answer(report: &Report) -> Vec<String> {
+    condition(report).into_iter().chain(unseen_half(report)).collect()
+}
+
+/// Trust, rest and losses.
+fn condition(report: &Report) -> Vec<String> {
     let mut sentences = vec![trust(report), rest(report), losses(report)];
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
-    sentences.extend(unseen_half(report));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
 }
@@ -421,7 +425,11 @@ pub fn part_notes(report: &Report) -> Vec<String> {
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     let LengthAdvice { known, longer, .. } = length_advice(report);
     let notes = part_note::in_short(&told_notes(report));
-    answer(report).into_iter().chain(known).chain(longer).chain(notes).chain(recent_fit(report)).collect()
+    let unseen = unseen_half(report);
+    // The screen has little room, and its table has the errors: first what a short record is good for.
+    let [first, second] = if is_short(report) { [known, unseen] } else { [unseen, known] };
+    let sentences = condition(report).into_iter().chain(first).chain(second).chain(longer);
+    sentences.chain(notes).chain(recent_fit(report)).collect()
 }
 
 struct Departure<'a> {
