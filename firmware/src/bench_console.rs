@@ -29,55 +29,47 @@ pub(crate) fn hexadecimal(digits: &str) -> Option<u16> {
 enum Request {
     Read(Register),
     Write(Register, u16),
-    Compare(Register),
     Deflections(Stimulus),
+    Compare(Register),
 }
 
 /// Overlapping reads of [`Request::Compare`]: 0.43 s in normal, 1.6 s in low-power mode.
 const COMPARED_READS: usize = 10_000;
 const OVERLAPPING_READS: usize = 16;
 
-/// The first value, the number of other values, and the bits in which they differ.
-fn compare<SPI: SpiDevice<u8>, D: DelayNs>(
+/// Returns the first value, the number of other values, and the bits in which they differ.
+fn compared<SPI: SpiDevice<u8>, D: DelayNs>(
     register: Register,
     sensor: &mut Adis16405<SPI, D>,
-) -> Result<TextLine, Error<SPI::Error>> {
+) -> Result<[i16; 6], Error<SPI::Error>> {
     let first = sensor.read_register(register)?;
     let (mut others, mut bits) = (0, 0);
     for _ in 0..COMPARED_READS / OVERLAPPING_READS {
         for value in sensor.read_registers([register; OVERLAPPING_READS])? {
-            others += u32::from(value != first);
+            others += i16::from(value != first);
             bits |= value ^ first;
         }
     }
-    Ok(text!("{first:#06x}  {others} of {COMPARED_READS} differ, bits {bits:#06x}"))
+    Ok([first as i16, others, bits as i16, 0, 0, 0])
 }
 
-/// Asks the sensor while sampling is off, with timing for either power mode; many reads go as fast as configured. A
-/// written register is read back if possible.
-#[allow(clippy::result_large_err, reason = "answer and error are lines to be printed")]
-fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<TextLine, TextLine> {
+/// Asks the sensor while sampling is off, with timing for either power mode; many reads go as fast as configured.
+/// Returns a register's value, six deflections or [`compared`]; the error is text to be printed.
+#[allow(clippy::result_large_err, reason = "the text of an error is made where its type is known, and printed")]
+fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<[i16; 6], TextLine> {
     board.set_sampling(false);
     let is_fast = matches!(request, Request::Compare(_));
     let sck_hz = board.set_clock_limit(if is_fast { clock_limit_hz(state.config) } else { LOW_POWER_LIMIT_HZ });
     let answer = {
         let mut sensor = addressed(board.sensor_bus(), state.config, sck_hz);
-        let written = match request {
-            Request::Write(register, value) => sensor.write_register(register, value),
-            _ => Ok(()),
-        };
-        let answer = written.and_then(|()| match request {
-            Request::Write(register, _) if register.access() == Access::Write => Ok(text!("written")),
-            Request::Read(register) | Request::Write(register, _) => {
-                sensor.read_register(register).map(|value| text!("{value:#06x}  {}", value as i16))
-            }
+        let answer = match request {
+            Request::Read(register) => sensor.read_register(register).map(|value| [value as i16, 0, 0, 0, 0, 0]),
+            Request::Write(register, value) => sensor.write_register(register, value).map(|()| [0; 6]),
+            Request::Deflections(stimulus) => sensor.stimulus_response(stimulus),
             Request::Compare(register) => {
-                compare(register, &mut sensor.with_timing(Timing::DEFAULT).with_sck_hz(sck_hz))
+                compared(register, &mut sensor.with_timing(Timing::DEFAULT).with_sck_hz(sck_hz))
             }
-            Request::Deflections(stimulus) => {
-                sensor.stimulus_response(stimulus).map(|[a, b, c, d, e, f]| text!("{a} {b} {c}  {d} {e} {f}"))
-            }
-        });
+        };
         answer.map_err(|error| text!("{error}"))
     };
     board.set_clock_limit(clock_limit_hz(state.config));
@@ -85,22 +77,29 @@ fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<
     answer
 }
 
-// Kept out of line: it is called for three commands.
+/// The line of a register that was read, also one of the dump.
 #[inline(never)]
-fn line(register: Register, request: Request, state: &DeviceState, board: &mut impl Board) -> TextLine {
-    let (Ok(answer) | Err(answer)) = ask(request, state, board);
-    text!("{:<10} {:#04x}  {answer}", register.name(), register.address())
-}
-
 pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
-    match register.access() {
-        Access::Write => text!("{} cannot be read", register.name()),
-        _ => line(register, Request::Read(register), state, board),
+    let (name, address) = (register.name(), register.address());
+    if register.access() == Access::Write {
+        return text!("{name} cannot be read");
+    }
+    match ask(Request::Read(register), state, board) {
+        Ok([value, ..]) => text!("{name:<10} {address:#04x}  {:#06x}  {value}", value as u16),
+        Err(error) => text!("{name:<10} {address:#04x}  {error}"),
     }
 }
 
 pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
-    line(register, Request::Compare(register), state, board)
+    let (name, address) = (register.name(), register.address());
+    match ask(Request::Compare(register), state, board) {
+        Ok([first, others, bits, ..]) => text!(
+            "{name:<10} {address:#04x}  {:#06x}  {others} of {COMPARED_READS} differ, bits {:#06x}",
+            first as u16,
+            bits as u16
+        ),
+        Err(error) => text!("{name:<10} {address:#04x}  {error}"),
+    }
 }
 
 /// Bits of GLOB_CMD that write the sensor's flash (data sheet Rev. B, pages 10 and 13).
@@ -111,11 +110,16 @@ pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
     register == Register::GlobCmd && value & FLASH_COMMANDS != 0
 }
 
-/// Writes a register; `check` restores the device's own settings.
+/// Writes a register and reads it back if possible; `check` restores the device's own settings.
 pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {
+    let name = register.name();
     match register.access() {
-        Access::Read => text!("{} cannot be written", register.name()),
-        _ => line(register, Request::Write(register, value), state, board),
+        Access::Read => text!("{name} cannot be written"),
+        access => match ask(Request::Write(register, value), state, board) {
+            Ok(_) if access == Access::Write => text!("{name} written"),
+            Ok(_) => read_register(register, state, board),
+            Err(error) => text!("{name}: {error}"),
+        },
     }
 }
 
@@ -201,8 +205,10 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
     // The filter still contains samples of the deflected sensor.
     let now_us = board.now_us();
     board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
-    let (Ok(response) | Err(response)) = response;
-    AnswerLine::Text(text!("{sign} {response}"))
+    AnswerLine::Text(match response {
+        Ok([a, b, c, d, e, f]) => text!("{sign} {a} {b} {c}  {d} {e} {f}"),
+        Err(error) => text!("{sign} {error}"),
+    })
 }
 
 /// Longest test with one stimulus, s; everything else waits for it.

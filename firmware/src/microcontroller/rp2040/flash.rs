@@ -99,7 +99,10 @@ unsafe extern "C" fn operate_flash(command: &Command) {
     }
 }
 
-/// SAFETY: as for `operate_flash`, whose code it is part of.
+/// Part of [`operate_flash`], in RAM as it is.
+///
+/// # Safety
+/// Nothing else uses the flash, and `id` has room for the number.
 #[inline(always)]
 unsafe fn read_unique_id(id: *mut u8) {
     // SAFETY: the registers are those of the SSI.
