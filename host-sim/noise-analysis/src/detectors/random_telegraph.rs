@@ -58,7 +58,7 @@ pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times
     found
 }
 
-/// Whether a Gaussian process is [`TOLD_APART`] times as likely as two levels, both with about this standard deviation and this correlation
+/// True if a Gaussian process is [`TOLD_APART`] times as likely as two levels, both with about this standard deviation and this correlation
 /// time, in s, where the white noise is behind a filter whose response lasts `filter_s` seconds, or behind none.
 pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant: f64, filter_s: f64) -> bool {
     let part_s = (time_constant / RESOLVED).max(FILTER_LENGTHS * filter_s);
@@ -70,7 +70,7 @@ pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant:
     gauss_markov_log_likelihood(&means) - levels.log_likelihood > TOLD_APART.ln()
 }
 
-/// Whether a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
+/// True if a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
 /// quarter of `time_constant` s. Disturbances that begin at once and decay do not.
 ///
 /// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
@@ -87,7 +87,7 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
     sixths <= 0.0 || cubes.abs() < quantile(0.5 * REFUTED) * sixths.sqrt()
 }
 
-/// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
+/// True if visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
 /// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
 /// over the square of the time constant `1/(a + b)`.
 pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {
