@@ -96,7 +96,7 @@ impl Law {
     }
 }
 
-/// Whether a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
+/// True if a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
 /// quarter of `time_constant` s. Disturbances that begin at once and decay do not.
 ///
 /// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
@@ -113,7 +113,7 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
     sixths <= 0.0 || cubes.abs() < quantile(0.5 * REFUTED) * sixths.sqrt()
 }
 
-/// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
+/// True if visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
 /// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
 /// over the square of the time constant `1/(a + b)`.
 pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {

@@ -1,5 +1,5 @@
-//! What the model, the spectrum and the covariates of a channel propose, with bounds and with evidence that a person can check. Which of
-//! it stands is told by the [table](crate::rivals::table).
+//! Proposals by the model, the spectrum and the covariates of a channel, with bounds and with evidence that a person can check. The
+//! [table](crate::rivals::table) decides which of them stand.
 
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
@@ -43,7 +43,7 @@ const WIDEST_BAND: f64 = 2.0;
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
 const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
 
-/// What was found in a channel over the whole record.
+/// Findings in a channel over the whole record.
 pub(crate) struct ChannelFindings<'a> {
     pub channel: ChannelProfile,
     /// Smallest distance of two values, in the channel's unit.
@@ -61,7 +61,7 @@ pub(crate) struct ChannelFindings<'a> {
     pub rest: Option<&'a UniformSeries>,
 }
 
-/// What is proposed of a channel beyond the baseline model, but for what preprocessing found, and what decides beside it.
+/// Proposals of a channel beyond the baseline model, without those of preprocessing, and the properties that decide between them.
 pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (Vec<Proposal>, ChannelFacts) {
     let &ChannelFindings { channel, resolution, fit, lines, .. } = findings;
     let (unit, period_s) = (channel.unit, fit.after().sample_period());
@@ -206,7 +206,7 @@ fn law_by_samples(findings: &ChannelFindings, term: &FittedTerm, markov: Markov)
     Law::of_process(&rest, term.value, markov.time_constant, filter_length_s(model))
 }
 
-/// Whether a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
+/// True if a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
 fn is_gaussian(kurtosis: &KurtosisRatio) -> bool {
     (0.5 - kurtosis.ratio) / kurtosis.error.powi(2) > TOLD_APART.ln()
 }
@@ -230,13 +230,13 @@ fn kurtosis_ratio(
     telegraph::kurtosis_ratio(&estimator.curve(rest.sample_period()).scaled(step), model, markov)
 }
 
-/// Whether a term is a resonance of whose bandwidth a record of this length bounds both sides.
+/// True if a term is a resonance of whose bandwidth a record of this length bounds both sides.
 fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
     let Shape::Resonance { bandwidth: (narrowest, widest), .. } = term.shape else { return false };
     matches!(term.kind, NoiseTerm::Resonance(of) if narrowest > 1.0 / duration_s && widest < WIDEST_BAND * of.frequency)
 }
 
-/// Whether a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
+/// True if a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
 /// noise, filtered or not, is no larger than the rounding error.
 fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     let period_s = model.sample_period();
@@ -246,7 +246,7 @@ fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     markov.time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding
 }
 
-/// What the curve shows of a term that was added.
+/// Evidence of an added term in the curve.
 fn curve_evidence(found: &Addition, period_s: f64) -> CurveEvidence {
     let residual = found.residual;
     CurveEvidence {
@@ -297,7 +297,7 @@ fn telegraph_effect(term: &FittedTerm, distance: f64, evidence: TelegraphEvidenc
 /// A term that fits an octave of the curve and is contradicted.
 fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, term: &FittedTerm, by: Refutation) -> Effect {
     let point = curve.points().iter().find(|point| point.n == found.residual.n);
-    // Of the measured deviation at this averaging time; that of the model is taken as exact.
+    // The bound is that of the measured deviation at this averaging time; the model's is taken as exact.
     let bound = |of: fn(&AllanPoint) -> f64| point.map_or(1.0, |point| (of(point) / point.avar).sqrt());
     let percent = |factor: f64| 100.0 * ((1.0 + found.residual.excess) * factor - 1.0);
     let (low, high) = (percent(bound(|point| point.low)), percent(bound(|point| point.high)));
@@ -388,7 +388,7 @@ fn sensitivity_effect(channel: ChannelProfile, (regressor, of): &(ChannelProfile
     }
 }
 
-/// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value is at most
+/// True if a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value is at most
 /// a standard error beyond the largest plausible multiple of the data sheet's, or its interval includes zero.
 ///
 /// One of the sensor's is anywhere up to that multiple m; the ratio of a drift that both channels share is of any size, as often in one
