@@ -203,7 +203,8 @@ impl App {
         has_room
     }
 
-    /// Executes a command; the answer of one line, if it has one.
+    /// Executes a command; the answer of one line, if it has one. Not inlined: its lines would add to the stack of a fit.
+    #[inline(never)]
     fn execute(&mut self, command: Command, board: &mut impl Board) -> Option<TextLine> {
         let (now_us, config) = (board.now_us(), self.state.config);
         let (range, taps, period) = (config.range(), config.filter_taps_log2(), config.sample_period());
