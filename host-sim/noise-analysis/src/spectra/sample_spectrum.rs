@@ -9,7 +9,7 @@
 //! The even continuation of a record has no jump at its ends. The cosines are the principal components of white noise and of a random
 //! walk whose first value is unknown: their coefficients are independent, with the variance `S(k/2T)/dt` of the two-sided density `S`.
 
-use super::line_models::Sine;
+use super::lines::without_sines_at;
 use super::transforms::cosine_transform;
 use super::welch::Welch;
 use super::whittle::SpectralBand;
@@ -47,7 +47,7 @@ pub struct SampleSpectrum {
     /// Frequency of the coefficient of order 1, and distance of the points of Welch's spectrum, Hz.
     pub(super) resolution: f64,
     pub(super) point_resolution: f64,
-    /// Of the samples.
+    /// Rounding of the samples.
     pub(super) rounding: Rounding,
     /// Share of the samples that are interpolated.
     pub(super) interpolated: f64,
@@ -59,7 +59,7 @@ pub(super) struct SampleBand {
     pub(super) place: Place,
 }
 
-/// What a band is an average of.
+/// The coefficients that a band averages.
 pub(super) enum Place {
     /// Squares of the coefficients of the cosine transform, of the orders 1, 2, 3 … from index 0 on.
     Coefficients(Range<usize>),
@@ -68,7 +68,7 @@ pub(super) enum Place {
 }
 
 impl SampleSpectrum {
-    /// Of a series with `lines` at these frequencies in Hz. `None` if a long gap is missing, or if there are fewer than 1,024 samples.
+    /// The spectrum of a series with `lines` at these frequencies in Hz. `None` if a long gap is missing, or if there are fewer than 1,024 samples.
     #[must_use]
     pub fn of_samples(series: &UniformSeries, lines: &[f64]) -> Option<Self> {
         Self::of_values(series, 1, lines, f64::INFINITY)
@@ -84,7 +84,7 @@ impl SampleSpectrum {
         Some(spectrum)
     }
 
-    /// Of Welch's spectrum of samples with this rounding alone, in which also long gaps are left out; `lines` are at these frequencies in Hz.
+    /// From Welch's spectrum of samples with this rounding alone, which leaves out long gaps too; `lines` are at these frequencies in Hz.
     ///
     /// The error of the best interpolation is uncorrelated with all other samples, and its variance is the harmonic mean of the density: a share
     /// of `interpolated` samples lacks as much white noise.
@@ -111,7 +111,7 @@ impl SampleSpectrum {
         }
     }
 
-    /// Whether at most a thousandth of the samples is interpolated.
+    /// True if at most a thousandth of the samples is interpolated.
     pub(crate) fn has_all_noise(&self) -> bool {
         self.interpolated <= MOST_INTERPOLATED
     }
@@ -124,13 +124,10 @@ impl SampleSpectrum {
     /// The bands of the coefficients of `series` below a frequency.
     fn of_values(series: &UniformSeries, samples_per_mean: u64, lines: &[f64], below: f64) -> Option<Self> {
         let (filled, interpolated) = series.interpolated();
-        let mut filled = filled.into_owned();
         let (period, resolution) = (series.sample_period(), 0.5 / series.duration());
         // Means show a line at its alias.
         let shown: Vec<f64> = lines.iter().map(|line| (line - (line * period).round() / period).abs()).collect();
-        for &line in shown.iter().filter(|line| **line > resolution) {
-            filled = Sine::fit_near(&filled, line, resolution).subtracted_from(&filled);
-        }
+        let filled = without_sines_at(&filled, shown.iter().copied());
         let values = filled.values();
         let is_whole = values.len() >= LEAST_SAMPLES && values.iter().all(|value| value.is_finite());
         if !is_whole {
