@@ -162,8 +162,18 @@ impl SampleStream {
         Self::open(Origin::File { input, options: Box::new(options), range: None }, reading, &monitor)
     }
 
-    fn open(origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
-        let mut survey = Survey::read(&origin, reading, u64::MAX, monitor)?;
+    fn open(mut origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
+        let survey = Survey::read(&origin, reading, u64::MAX, monitor);
+        let mut survey = survey.or_else(|error| match &mut origin {
+            // A stated rate needs no times, which may be the fault.
+            Origin::File { options, .. } if reading.stated_hz.is_some() => {
+                options.selection = std::mem::take(&mut options.selection).without_time();
+                let Ok(mut survey) = Survey::read(&origin, reading, u64::MAX, monitor) else { return Err(error) };
+                survey.read.notes.push(format!("the time stamps are ignored: {error}"));
+                Ok(survey)
+            }
+            _ => Err(error),
+        })?;
         let samples = survey.samples(reading.kept)?;
         Ok(Self { origin, reading, survey, samples, monitor: monitor.clone() })
     }
