@@ -526,7 +526,8 @@ fn whatever_a_program_writes_between_numbers_they_are_read() {
 /// The rate of the user needs no column of times, whatever is in it.
 #[test]
 fn a_stated_rate_beats_a_column_that_is_no_time() {
-    let times: [(&str, fn(u32) -> String); 5] = [
+    type TimeOfRow = fn(u32) -> String;
+    let times: [(&str, TimeOfRow); 5] = [
         ("words", |row| format!("tick {row}")),
         ("reversed", |row| format!("{:.2}", f64::from(ROWS - row) / 100.0)),
         ("in groups", |row| format!("\"1,{:03},000\"", row % 1000)),
