@@ -55,7 +55,7 @@ pub use equation_5::allan_deviations_by_spectrum;
 pub(crate) use harmonics::nearest_multiple;
 pub use line_envelope::Modulation;
 pub use lines::find_lines;
-pub(crate) use lines::{find_lines_over, without_sines, without_slow_sines};
+pub(crate) use lines::{find_lines_over, without_sines, without_sines_at, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;
 pub(crate) use sample_likelihood::SpectrumBehindFilter;
 pub use sample_spectrum::SampleSpectrum;

@@ -199,10 +199,10 @@ pub(super) fn required_ratio(places: f64) -> f64 {
     0.5 * z * z
 }
 
-/// Solves `ratio(size) = required`; `ratio` increases.
+/// Solves `ratio(size) = required` to one part in 10⁹; `ratio` increases.
 pub(super) fn solve_size(required: f64, ratio: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (1e-9f64, 1e6f64);
-    for _ in 0..60 {
+    while high > (1.0 + 1e-9) * low {
         let middle = (low * high).sqrt();
         if ratio(middle) < required { low = middle } else { high = middle }
     }

@@ -149,12 +149,12 @@ mod tests {
         }
     }
 
+    /// One of 150 has a probability of 0.3 % at the significance of a finding.
     #[test]
     fn a_level_that_wanders_seldom_changes_once() {
         for part in [0.01, 0.03, 0.1] {
-            let found = (0..500).filter(|&seed| find(&wandering_noise(seed, 0.3, part)).is_some());
-            let found = found.count();
-            assert!(found <= 2, "{found} of 500, {part}");
+            let found = (0..150).filter(|&seed| find(&wandering_noise(seed, 0.3, part)).is_some()).count();
+            assert!(found <= 1, "{found} of 150, {part}");
         }
     }
 

@@ -13,7 +13,7 @@ use crate::effects::{
     Unexplained, UnexplainedPlace,
 };
 use crate::fit::channel_fit::ChannelFit;
-use crate::fit::noise_terms::{MAX_LOW_PASS_SAMPLES, is_white, line_frequency};
+use crate::fit::noise_terms::{MAX_LOW_PASS_SAMPLES, filter_length_s, is_filter, is_white, line_frequency};
 use crate::fit::traced_model::Addition;
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
 use crate::rivals::slow_drift::ChannelsInCommon;
@@ -22,8 +22,8 @@ use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::rounding::{DITHERED_OCTAVES, Rounding};
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
 use crate::samples::uniform_series::UniformSeries;
-use crate::spectra::Modulation;
 use crate::spectra::spectral_lines::{FEW_PERIODS, MergedLine};
+use crate::spectra::{Modulation, without_sines_at};
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
@@ -182,13 +182,22 @@ fn markov_effects(
     effects
 }
 
-/// Whether the samples of a channel say that a Markov term of its model is a Gaussian process and no two levels. They do not where anything
-/// else in them is correlated: a line, noise behind a filter or a second process are nearer to a Gaussian process than to levels.
+/// Whether the samples of a channel, without its sinusoids, say that a Markov term of its model is a Gaussian process and no two levels. They
+/// do not if anything else in them is correlated for longer than a filter's response: a band or a second process is nearer to a Gaussian
+/// process than to levels.
 fn are_samples_gaussian(findings: &ChannelFindings, term: &FittedTerm, markov: Markov) -> bool {
-    let is_known = |other: &FittedTerm| other.kind == term.kind || NoiseTerm::BASELINE.contains(&other.kind);
-    let is_alone = findings.lines.is_none_or(<[_]>::is_empty) && findings.fit.after().terms().iter().all(is_known);
-    let is_gaussian = |rest| random_telegraph::is_gaussian(rest, term.value, markov.time_constant);
-    is_alone && findings.rest.is_some_and(is_gaussian)
+    let model = findings.fit.after();
+    let is_known = |other: &FittedTerm| {
+        let is_sinusoid = matches!(other.kind, NoiseTerm::Sinusoid(_));
+        other.kind == term.kind || is_sinusoid || is_filter(&other.kind) || NoiseTerm::BASELINE.contains(&other.kind)
+    };
+    let lines = findings.lines.unwrap_or_default();
+    if !model.terms().iter().all(is_known) || !lines.iter().all(MergedLine::is_sinusoid) {
+        return false;
+    }
+    let Some(rest) = findings.rest else { return false };
+    let rest = without_sines_at(rest, lines.iter().map(|line| line.frequency.value));
+    random_telegraph::is_gaussian(&rest, term.value, markov.time_constant, filter_length_s(model))
 }
 
 /// Whether a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.

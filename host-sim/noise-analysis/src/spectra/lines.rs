@@ -106,6 +106,13 @@ pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, V
     (series, found.into_iter().map(|(_, line)| line).collect())
 }
 
+/// A series without the sinusoids near these frequencies, Hz.
+pub(crate) fn without_sines_at(series: &UniformSeries, frequencies: impl Iterator<Item = f64>) -> UniformSeries {
+    let resolution = 0.5 / series.duration();
+    let without = |series: UniformSeries, at: f64| Sine::fit_near(&series, at, resolution).subtracted_from(&series);
+    frequencies.filter(|frequency| *frequency > resolution).fold(series.clone(), without)
+}
+
 /// Removes the sinusoids that stand out of means of at least [`SLOW_BLOCKS`] blocks.
 pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     let size = (series.values().len() / SLOW_BLOCKS).max(1);

@@ -305,6 +305,17 @@ mod tests {
         assert!((power - 1.0).abs() < 0.06, "{power}");
     }
 
+    /// Ordinates of 500 at 12 and at 18 periods: the sums near 6 periods, which have no fundamental, are above the 218 of the sawtooth.
+    #[test]
+    fn a_sawtooth_is_found_beside_two_stronger_lines() {
+        let lines = |turn: f64| 0.35 * ((TAU * 12.0 * turn).sin() + (TAU * 18.0 * turn).sin());
+        for seed in 70..80 {
+            let of = series(seed, 0.0, |turn| lines(turn) + ((21.7 * turn).fract() - 0.5));
+            let found = PeriodicSignal::find(&of).expect("five times the power between the harmonics");
+            assert!((found.frequency.value * 0.1 * SAMPLES as f64 - 21.7).abs() < 0.2, "{seed}: {found:?}");
+        }
+    }
+
     #[test]
     fn a_weak_sawtooth_is_found_by_its_fundamental_too() {
         let found = (50..70).filter_map(|seed| {

@@ -9,7 +9,7 @@
 //! The even continuation of a record has no jump at its ends. The cosines are the principal components of white noise and of a random
 //! walk whose first value is unknown: their coefficients are independent, with the variance `S(k/2T)/dt` of the two-sided density `S`.
 
-use super::line_models::Sine;
+use super::lines::without_sines_at;
 use super::transforms::cosine_transform;
 use super::welch::Welch;
 use super::whittle::SpectralBand;
@@ -124,13 +124,10 @@ impl SampleSpectrum {
     /// The bands of the coefficients of `series` below a frequency.
     fn of_values(series: &UniformSeries, samples_per_mean: u64, lines: &[f64], below: f64) -> Option<Self> {
         let (filled, interpolated) = series.interpolated();
-        let mut filled = filled.into_owned();
         let (period, resolution) = (series.sample_period(), 0.5 / series.duration());
         // Means show a line at its alias.
         let shown: Vec<f64> = lines.iter().map(|line| (line - (line * period).round() / period).abs()).collect();
-        for &line in shown.iter().filter(|line| **line > resolution) {
-            filled = Sine::fit_near(&filled, line, resolution).subtracted_from(&filled);
-        }
+        let filled = without_sines_at(&filled, shown.iter().copied());
         let values = filled.values();
         let is_whole = values.len() >= LEAST_SAMPLES && values.iter().all(|value| value.is_finite());
         if !is_whole {
