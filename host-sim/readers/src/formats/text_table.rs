@@ -53,13 +53,13 @@ enum Layout {
 
 /// Rows of a kind that is counted, with the first.
 #[derive(Debug, Default)]
-struct Counted {
+struct CountedRows {
     rows: u64,
     first: Option<InputError>,
     note: String,
 }
 
-impl Counted {
+impl CountedRows {
     fn add(&mut self, error: InputError) {
         self.rows += 1;
         if self.first.is_none() {
@@ -84,9 +84,9 @@ impl Counted {
 #[derive(Debug, Default)]
 struct DamagedRows {
     rows: u64,
-    damaged: Counted,
+    damaged: CountedRows,
     /// Rows with words for values.
-    words: Counted,
+    words: CountedRows,
 }
 
 impl DamagedRows {
