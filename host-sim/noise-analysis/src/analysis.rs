@@ -33,7 +33,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// What an analysis does, in this order.
+/// The stages of an analysis, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Looks for what the samples show before models are fitted to them.
@@ -47,7 +47,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// How many there are.
+    /// Their number.
     pub const COUNT: usize = 4;
 }
 
@@ -73,8 +73,8 @@ pub fn analyze(measurement: &Measurement) -> Report {
     }
 }
 
-/// As [`analyze`], of a measurement that is not needed afterwards: the samples of a long one are released when it is condensed. Calls
-/// `watch` with each stage when it begins.
+/// Analyses like [`analyze`] a measurement that is not needed afterwards: the samples of a long one are released when it is condensed.
+/// Calls `watch` with each stage when it begins.
 #[must_use]
 pub fn analyze_and_release(measurement: Measurement, watch: &dyn Fn(Stage)) -> Report {
     let record = match long_record::condensed_from(&measurement) {
@@ -101,7 +101,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     let half = record.first_half();
     let (whole, halves) = PreprocessedRecord::with_halves(record, &half);
     watch(Stage::Models);
-    // Beside each other: where one waits for its slowest channel, the other goes on.
+    // The two run side by side: while one waits for its slowest channel, the other goes on.
     let ((first_half, epochs), mut models) =
         parallel::both(|| FirstHalf::fit(&whole, &half, &halves), || whole.fit(None));
     models.take_terms_that_held(&first_half.part, &whole.estimators.second);
@@ -109,7 +109,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     models.take_coefficients_of_samples();
     watch(Stage::Effects);
     let effects = whole.effects(&models);
-    // What the first half shows by itself, to compare with what the whole record shows.
+    // The findings of the first half alone are compared with those of the whole record.
     let of_half = || {
         if effects.iter().all(Vec::is_empty) {
             return effects.clone();
@@ -180,7 +180,7 @@ fn channel_reports(
 /// Samples of a channel that are missing in its model.
 fn missing_samples(whole: &PreprocessedRecord, channel: ChannelId) -> MissingSamples {
     let CondensedRecord { description, samples_per_mean, channels, .. } = whole.record;
-    // Of means, a knock has all of their samples.
+    // A knock takes all samples of a mean.
     let by_rules = whole.preprocessing.refused(channel).map(|(cause, means)| (cause, means * samples_per_mean));
     let own = channels[channel].refused.iter().map(|(&cause, &count)| (cause, count));
     missing(description, own.chain(by_rules), whole.estimators.both.replaced(channel))
@@ -209,7 +209,7 @@ fn common_mode_regression(measurement: &Measurement, channels: &[ChannelReport])
     CommonModeRegression::estimate(measurement, &followed)
 }
 
-/// What the samples of a channel say beside its fits.
+/// Results from the samples of a channel beside its fits.
 struct Assessed {
     assessment: Assessment,
     /// The Allan deviation by the measured spectrum at each octave.
@@ -217,7 +217,7 @@ struct Assessed {
 }
 
 impl Assessed {
-    /// By the models of the whole record and of its first half, with the series `by_first_half` of both halves.
+    /// Uses the models of the whole record and of its first half, with the series `by_first_half` of both halves.
     fn new(
         whole: &PreprocessedRecord,
         channel: ChannelId,
@@ -233,7 +233,7 @@ impl Assessed {
             uncompensated: trace.fit.with_covariates(),
             of_first_half: half.fit.with_covariates(),
         };
-        // By the spectrum of the samples as they were recorded, as the measured curve is.
+        // The deviation follows from the spectrum of the samples as they were recorded, like the measured curve.
         let factors: Vec<u64> = (0..OCTAVES).map(|octave| 1 << octave).collect();
         let mut by_spectrum = allan_deviations_by_spectrum(&UniformSeries::from_series(&recorded), &factors);
         // Means tell nothing of the averaging times that are shorter than they are.

@@ -13,7 +13,7 @@ pub struct MeasuredValue {
 }
 
 impl MeasuredValue {
-    /// With the 95 % bounds of a normal distribution, of a quantity that is not negative.
+    /// The 95 % bounds of a normal distribution, for a quantity that is not negative.
     pub(crate) fn bounds(self) -> BoundedEstimate {
         let half = NORMAL_975 * self.error;
         BoundedEstimate::new(self.value, (self.value - half).max(0.0), self.value + half)

@@ -65,7 +65,7 @@ pub fn poisson_tail(count: u64, mean: f64) -> f64 {
     match (count, Poisson::new(mean)) {
         (0, _) => 1.0,
         (_, Ok(distribution)) => distribution.sf(count - 1),
-        // Of a mean of 0.
+        // The mean is 0.
         (_, Err(_)) => 0.0,
     }
 }

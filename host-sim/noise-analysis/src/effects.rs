@@ -143,12 +143,12 @@ impl Effect {
         lasting.map(|named| (named.name, named.parameter.estimate())).collect()
     }
 
-    /// Whether both are of one kind.
+    /// True if both are of one kind.
     pub(crate) fn is_of_kind(&self, other: &Self) -> bool {
         std::mem::discriminant(self) == std::mem::discriminant(other)
     }
 
-    /// Whether it is a periodic signal that has lines in the spectrum.
+    /// True if it is a periodic signal that has lines in the spectrum.
     #[must_use]
     pub const fn is_line(&self) -> bool {
         matches!(self, Self::SinusoidalLine(_) | Self::ResonantLine(_) | Self::SquareWave(_))
@@ -163,7 +163,7 @@ impl Effect {
         }
     }
 
-    /// Whether both are one cause, in channels of the same unit or not.
+    /// True if both are one cause, in channels of the same unit or not.
     pub(crate) fn is_one_cause(&self, other: &Self, is_same_unit: bool) -> bool {
         self.is_of_kind(other) && self.kind().occurrence().is_one_cause(other.kind().occurrence(), is_same_unit)
     }

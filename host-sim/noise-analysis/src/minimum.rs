@@ -7,7 +7,7 @@ const MOST_STEPS: usize = 50;
 const PRECISION: f64 = 1e-3;
 const LONGEST_STEP: f64 = 4.0;
 
-/// Where `of` is least in an interval that has one minimum, to within `width`: at the vertex of a parabola through the three best places, and
+/// The place of the only minimum of `of` in an interval, to within `width`: at the vertex of a parabola through the three best places, and
 /// by the golden section where that does not lead on (R. Brent, "Algorithms for minimization without derivatives", 1973, chapter 5).
 pub(crate) fn least_within((mut low, mut high): (f64, f64), width: f64, mut of: impl FnMut(f64) -> f64) -> f64 {
     let mut tried = |at: f64| (at, of(at));
@@ -47,7 +47,7 @@ pub(crate) fn least_within((mut low, mut high): (f64, f64), width: f64, mut of: 
     }
 }
 
-/// Where the parabola through three points has its vertex; no number where they are not three.
+/// The vertex of the parabola through three points; NaN if two of them are the same.
 fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
     let (to_b, to_c) = ((a.0 - b.0) * (a.1 - c.1), (a.0 - c.0) * (a.1 - b.1));
     a.0 - 0.5 * ((a.0 - b.0) * to_b - (a.0 - c.0) * to_c) / (to_b - to_c)
@@ -89,7 +89,7 @@ pub(crate) fn reach(first: f64, far: f64, mut deviate: impl FnMut(f64) -> f64) -
     distance
 }
 
-/// Where `of` is least near `start`, at most `farthest` from 0, to within `width`: downhill in growing steps, then between the last three of them.
+/// The place of the minimum of `of` near `start`, at most `farthest` from 0, to within `width`: downhill in growing steps, then between the last three of them.
 pub(crate) fn downhill(of: impl Fn(f64) -> f64, (start, step): (f64, f64), farthest: f64, width: f64) -> f64 {
     let mut step = if of(start + step) < of(start - step) { step } else { -step };
     let (mut behind, mut here, mut value) = (start - step, start, of(start));
@@ -105,7 +105,7 @@ pub(crate) fn downhill(of: impl Fn(f64) -> f64, (start, step): (f64, f64), farth
     least_within((low, high), width, of)
 }
 
-/// Where a condition that `holds` at `inside` ends towards `outside`, after so many `steps` by halves; `outside` if it holds there.
+/// The end, towards `outside`, of a condition that `holds` at `inside`, after so many `steps` of bisection; `outside` if it holds there.
 pub(crate) fn end_of((mut inside, mut outside): (f64, f64), steps: usize, mut holds: impl FnMut(f64) -> bool) -> f64 {
     if holds(outside) {
         return outside;
@@ -117,7 +117,7 @@ pub(crate) fn end_of((mut inside, mut outside): (f64, f64), steps: usize, mut ho
     0.5 * (inside + outside)
 }
 
-/// Where `of`, from a minimum `at` towards `end`, has risen by so much; `end` where it stays below. Near a minimum it is about a parabola, whose
+/// The place at which `of`, from a minimum `at` towards `end`, has risen by `rise`; `end` if it stays below. Near a minimum it is about a parabola, whose
 /// root rises straight.
 pub(crate) fn risen((at, end): (f64, f64), rise: f64, mut of: impl FnMut(f64) -> f64) -> f64 {
     let least = of(at);

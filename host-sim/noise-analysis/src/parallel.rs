@@ -1,5 +1,5 @@
-//! How many threads an analysis may use: as many as there are cores, or as many as the caller says, one where the recordings
-//! themselves are analysed side by side. The result does not depend on it. And its cancellation.
+//! Threads and cancellation of an analysis. It uses as many threads as there are cores, or as many as the caller says: one if the
+//! recordings themselves are analysed side by side. The result does not depend on the number.
 
 use measurement::{ChannelId, PerChannel};
 use std::cell::{Cell, RefCell};
@@ -43,7 +43,7 @@ pub struct Cancelled;
 /// It was cancelled.
 pub fn cancellable<R>(is_cancelled: impl Fn() -> bool + 'static, task: impl FnOnce() -> R) -> Result<R, Cancelled> {
     let before = IS_CANCELLED.replace(Some(Rc::new(is_cancelled)));
-    // What the task holds is dropped: nobody sees it half done.
+    // A task that panics drops what it holds, so no half-done state is seen.
     let result = catch_unwind(AssertUnwindSafe(task));
     IS_CANCELLED.set(before);
     result.map_err(|panic| if panic.is::<Cancelled>() { Cancelled } else { resume_unwind(panic) })
@@ -104,7 +104,7 @@ fn on_threads(count: usize, work: &(dyn Fn() + Sync)) {
         return work();
     }
     std::thread::scope(|scope| {
-        // What they begin shares the number of threads, where that is limited.
+        // Their own tasks share the number of threads, if that is limited.
         let most = MOST_THREADS.get();
         let of_each = if most == usize::MAX { most } else { most / count };
         let workers: Vec<_> = (1..count).map(|_| scope.spawn(move || on_at_most(of_each, work))).collect();
@@ -129,7 +129,7 @@ pub(crate) fn both<A: Send, B>(first: impl FnOnce() -> A + Send, second: impl Fn
     })
 }
 
-/// What `task` makes of each channel, on as many threads as there are cores.
+/// Applies `task` to each channel, on as many threads as there are cores.
 pub(crate) fn per_channel<T: Send>(
     channels: impl Iterator<Item = ChannelId>,
     task: impl Fn(ChannelId) -> T + Sync,

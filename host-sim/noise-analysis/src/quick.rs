@@ -35,7 +35,7 @@ pub fn analyze(measurement: &Measurement) -> Report {
 }
 
 impl CurveEstimators {
-    /// Of the recording of this description, without samples.
+    /// Begins for a recording with this description, without samples.
     #[must_use]
     pub fn new(description: RecordingDescription) -> Self {
         let channel = |_: &ChannelProfile| StreamedCurves::new(&[description.middle()]);

@@ -38,11 +38,11 @@ pub const SCHEMA: u32 = 2;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     pub schema: u32,
-    /// Whether the report is of the curves alone, without what needs the samples themselves: spectra, spikes, steps, covariates,
+    /// True if the report is of the curves alone, without what needs the samples themselves: spectra, spikes, steps, covariates,
     /// causes that channels have in common, and changes of the noise. Absent where it is not.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub quick: bool,
-    /// As the user states it or as the time stamps show it, Hz.
+    /// Stated by the user or measured by the time stamps, Hz.
     pub sample_rate_hz: f64,
     /// Samples that the estimator used.
     pub samples: u64,
@@ -50,9 +50,9 @@ pub struct Report {
     pub dropped: BTreeMap<String, u64>,
     /// Samples that are used although a warning was raised, by cause.
     pub flagged: BTreeMap<String, u64>,
-    /// What the sensor has once for all its channels.
+    /// Properties that the sensor has once for all its channels.
     pub part: PartReport,
-    /// What the baseline models lack, one entry a cause.
+    /// Causes that the baseline models lack, one entry each.
     #[serde(skip)]
     pub findings: Vec<Finding>,
     /// Regression of the gyros and accelerometers on each other; absent where there are fewer than two, or too few samples.
@@ -71,9 +71,9 @@ pub(crate) fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String,
     counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
-/// What a sensor has once for all its channels: the clock of its converter and the low-pass filter before its output.
+/// Properties that a sensor has once for all its channels: the clock of its converter and the low-pass filter before its output.
 ///
-/// What the record does not identify is absent, and `notes` say why.
+/// Properties that the record does not identify are absent, and `notes` say why.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PartReport {
     /// Name of the sensor's profile.
@@ -86,7 +86,7 @@ pub struct PartReport {
     pub taps: Option<Parameter>,
     /// Samples of the sensor's own clock from one recorded sample to the next.
     pub decimation: Option<Parameter>,
-    /// What the record does not identify, and why.
+    /// Properties that the record does not identify, and the reasons.
     pub notes: Vec<PartNote>,
 }
 
@@ -126,7 +126,7 @@ pub enum PartNote {
     },
     /// A channel's own decimation is farther from the common one than chance explains.
     Contradicted { channel: &'static str, decimation: f64 },
-    /// Of the channels `able` to show the filter, whose noise is larger than a count, so many do.
+    /// Number of channels that show the filter, and of those `able` to: their noise is larger than a count.
     NotInAll { showing: usize, able: usize },
 }
 
@@ -178,7 +178,7 @@ pub struct ChannelReport {
     /// Assessment of the model for use in navigation.
     #[serde(rename = "practice")]
     pub assessment: Assessment,
-    /// What the figures show beside the Allan deviation.
+    /// Data of the figures beside the Allan deviation.
     #[serde(flatten)]
     pub figure_data: FigureData,
 }
@@ -191,7 +191,7 @@ pub struct MissingSamples {
     /// Samples that arrived and are not used, by cause: those that the reader refused in all channels or in this one, and
     /// what the analysis keeps out of the coefficients (`repeated`, `spikes`, `knock`).
     pub refused: BTreeMap<String, u64>,
-    /// Of all these, samples that the estimator replaced from their neighbours. The others lie in gaps that no octave bridges.
+    /// Samples among these that the estimator replaced from their neighbours. The others lie in gaps that no octave bridges.
     pub replaced: u64,
 }
 
@@ -290,7 +290,7 @@ pub struct ModelReport {
 /// One term of a noise model of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermReport {
-    /// With the 95 % bounds of its coefficient and of its shape.
+    /// The term with the 95 % bounds of its coefficient and of its shape.
     pub term: FittedTerm,
     /// N below the corner of a Markov process that stands in the place of white noise, which a filter has made of it; absent of other terms.
     pub white_noise: Option<BoundedEstimate>,
@@ -317,7 +317,7 @@ pub struct ModelErrorReport {
     pub contradiction: Option<Contradiction>,
 }
 
-/// What the figures of a channel show beside its Allan deviation.
+/// Data of the figures of a channel beside its Allan deviation.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct FigureData {
     /// Typical noise by the data sheet; absent where it says nothing.
@@ -364,13 +364,13 @@ pub struct BiasOverTime {
     /// Middle of each block, s from the first sample. Blocks without half of their samples are left out.
     pub time_s: Vec<f64>,
     pub mean: Vec<f64>,
-    /// What the channel's findings explain of it: steps, a ramp, and the share of temperature, supply and specific force. Empty
-    /// where they explain nothing.
+    /// The part that the channel's findings explain: steps, a ramp, and the share of temperature, supply and specific force. Empty
+    /// if they explain nothing.
     pub followed: Vec<f64>,
 }
 
 impl SlopeMethodReport {
-    /// By the slopes of `curve`, whose channel is in `unit`.
+    /// Reads N, B and K off the slopes of `curve`, whose channel is in `unit`.
     #[must_use]
     pub fn from_curve<const POINTS: usize>(curve: &Curve<POINTS>, unit: &str) -> Self {
         let value = |coefficient: Option<slope_method::SlopeEstimate>, kind: NoiseTerm| {

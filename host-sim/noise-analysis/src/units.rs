@@ -14,9 +14,9 @@ pub(crate) const GRAVITY: f64 = 9.806_65;
 pub struct Conversion {
     /// Such as `deg/sqrt(h)`.
     pub unit: &'static str,
-    /// What the coefficient of a channel in deg/s, g or gauss, with times in s, is multiplied by.
+    /// Factor of the coefficient of a channel in deg/s, g or gauss, with times in s.
     pub factor: f64,
-    /// Whether the coefficient is a standard deviation of samples at the record's rate.
+    /// True if the coefficient is a standard deviation of samples at the record's rate.
     pub discrete: bool,
 }
 

@@ -28,10 +28,10 @@ fn deviation(of: &Parameter) -> f64 {
     (of.high - of.low) / (2.0 * NORMAL_975)
 }
 
-/// Whether two estimates differ by more than both scatter.
+/// True if two estimates differ by more than both scatter.
 fn contradict(a: &Parameter, b: &Parameter) -> bool {
     let scatter = deviation(a).hypot(deviation(b));
-    // What is known to a part in 10⁹ is printed with fewer digits.
+    // A number that is known to a part in 10⁹ is printed with fewer digits.
     (a.value - b.value).abs() > CONTRADICTION * scatter + 1e-9 * a.value.abs()
 }
 
@@ -134,7 +134,7 @@ fn curve_by_spectrum(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     }
 }
 
-/// Whether two frequencies are of one line, or one of them is absent. Octaves tell a frequency to some tenths.
+/// True if two frequencies are of one line, or one of them is absent. Octaves tell a frequency to some tenths.
 fn is_one_line(a: Option<f64>, b: Option<f64>) -> bool {
     a.zip(b).is_none_or(|(a, b)| (a / b).ln().abs() < 0.25)
 }
@@ -195,13 +195,13 @@ fn effects_and_findings(report: &Report, channel: &ChannelReport, add: &mut impl
 /// curve is that of the term. White noise beside a filter is that of rounding.
 fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let baseline = ["angle_random_walk", "bias_instability", "rate_random_walk"];
-    // Where rounding hides the noise, terms stand for the rounding.
+    // Terms stand for the rounding if it hides the noise.
     let is_rounding = |kind: &str| kind == "noise_below_count" || kind == "quantization";
     let effects = || channel.effects.iter().map(|shown| &shown.effect);
     if effects().any(|effect| is_rounding(effect.name())) {
         return;
     }
-    // What the whole record no longer shows: its size may be 0.
+    // A term that the whole record no longer shows may have the size 0.
     let may_be_nothing = |term: &TermReport| {
         ["amplitude", "deviation"].iter().any(|of| term.parameters().get(*of).is_some_and(|of| of.low <= 0.0))
     };
@@ -285,7 +285,7 @@ fn spectrum_of_the_picture(channel: &ChannelReport, add: &mut impl FnMut(String)
     let (n, b, k) = (of("angle_random_walk"), of("bias_instability"), of("rate_random_walk"));
     for (&frequency, &modelled) in spectrum.frequency_hz.iter().zip(&spectrum.model) {
         let omega = 2.0 * PI * frequency;
-        // Of IEEE Std 952, one-sided: N², B²/(2πf), K²/(2πf)². Near half the sample rate the sampled walk has up to (π/2)² times as much.
+        // The one-sided densities of IEEE Std 952: N², B²/(2πf), K²/(2πf)². Near half the sample rate the sampled walk has up to (π/2)² times as much.
         let density = (2.0 * (n * n + b * b / omega + (k / omega).powi(2))).sqrt();
         if n > 0.0 && omega * n > 30.0 * k && (modelled / density).ln().abs() > 0.02 {
             add(format!("the picture's model has {modelled} at {frequency} Hz, its terms {density}"));

@@ -13,7 +13,7 @@ use std::f64::consts::{SQRT_2, TAU};
 
 const RATE_HZ: f64 = 100.0;
 
-/// What is added to the white noise of a channel at a time in s, in the channel's unit.
+/// The value that is added to the white noise of a channel at a time in s, in the channel's unit.
 type Waveform<'a> = &'a dyn Fn(&str, f64) -> f64;
 
 /// A recording of `seconds` of the gyros, the accelerometers and the temperature; white noise of 0.4 deg/s and 5 mg.
@@ -179,7 +179,7 @@ fn a_bias_behind_a_lag_and_one_with_a_curvature_are_told_from_a_proportional_one
         let expected = shares(&|time| waveform(channel, time), SECONDS);
         assert_near(stated_shares(&report.findings[finding], channel), expected, 0.8, channel);
     }
-    // What is left is white noise: no random walk is needed.
+    // The rest is white noise: no random walk is needed.
     for channel in &report.channels[..3] {
         let mut terms = channel.refitted.terms.iter();
         let walk = terms.find(|term| term.kind() == "rate_random_walk").expect("a baseline term");

@@ -1,5 +1,5 @@
-//! What the first half of a recording alone foretells of the second: no model of it depends on the second half, and spikes and knocks
-//! that are left out of the coefficients are foretold all the same.
+//! Predictions of the second half by the first alone: no model of it depends on the second half, and spikes and knocks that are left
+//! out of the coefficients are predicted all the same.
 
 use allan_core::Cascade;
 use measurement::adis16405::profile;
@@ -74,7 +74,7 @@ fn add_bursts(random: &mut ChaCha8Rng, values: &mut [f64], bursts: usize) {
 /// Changes the counts of two gyroscopes in a second half.
 type Change = fn(&mut [Vec<f64>; 2]);
 
-/// What happens in a second half.
+/// Changes in a second half.
 const SECOND_HALVES: [(&str, Change); 9] = [
     ("steps", |gyros| change(gyros, |at, value| value + if at > 0.5 { 0.25 * NOISE } else { 0.0 })),
     ("ramps", |gyros| change(gyros, |at, value| value + 3.0 * NOISE * at)),
@@ -230,7 +230,7 @@ fn the_curve_of_the_unseen_half_is_that_of_its_samples() {
     assert_eq!(report.unseen_adev.len() + 1, report.curve.len());
 }
 
-/// Of the 95 % bounds of N, B and K of the model `after`, how many hold: N is that of [`NOISE`], B and K are 0.
+/// The number of 95 % bounds of N, B and K of the model `after` that hold: N is that of [`NOISE`], B and K are 0.
 fn held(channel: &ChannelReport) -> usize {
     let bounds = |kind: &str| {
         let term = channel.after.terms.iter().find(|term| term.kind() == kind);
@@ -267,7 +267,7 @@ fn signals_of_the_first_half_are_foretold() {
             assert!(after <= 1.5 * curve, "{name}, seed {seed}: {after} {curve}");
             bounds_held += held(&channel);
         }
-        // Of 12 intervals of 95 % fewer than 8 hold in one of 4,000 cases.
+        // Fewer than 8 of twelve 95 % intervals hold in one of 4,000 cases.
         assert!(bounds_held >= 8, "{name}: {bounds_held}");
     }
 }

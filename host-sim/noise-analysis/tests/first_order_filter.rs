@@ -61,6 +61,6 @@ fn n_is_the_density_below_the_corner() {
             assert_eq!((printed.kind.as_str(), printed.value.value), ("angle_random_walk", n.value));
         }
     }
-    // Of twelve intervals of 95 % fewer than nine hold in one of 500 cases.
+    // Fewer than nine of twelve 95 % intervals hold in one of 500 cases.
     assert!(held >= 9, "{held}");
 }

@@ -59,7 +59,7 @@ fn a_step_and_a_temperature_are_found_beside_a_sinusoid() {
         let report = record(100.0, &[("gyro_x", stepped)]);
         let found = kinds(&report.channels[0]);
         assert!(found.contains(&"sinusoid") && found.contains(&"bias_step"), "seed {seed}: {found:?}");
-        // Of a period of 25 min, in counts of 0.14 °C.
+        // A period of 25 min, in counts of 0.14 °C.
         let temperature: Vec<f64> =
             (0..180_000).map(|at| 5.0 / 0.14 * (TAU * 0.01 * f64::from(at) / 1500.0).sin()).collect();
         own.iter_mut().zip(&temperature).for_each(|(value, temperature)| *value += 0.14 * temperature);

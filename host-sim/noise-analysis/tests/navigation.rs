@@ -46,7 +46,7 @@ fn the_predicted_error_is_that_of_simulated_data() {
     for (sum, edf) in sums {
         assert!((sum / edf - 1.0).abs() < 4.0 * (2.0 / edf).sqrt(), "{sum} of {edf}");
     }
-    // Of 36 intervals of 95 %, fewer than 30 hold the prediction once in two thousand.
+    // Fewer than 30 of 36 95 % intervals hold the prediction once in two thousand.
     assert!(inside >= 30, "{inside} of 36");
 }
 
@@ -79,7 +79,7 @@ fn the_innovations_of_a_true_model_are_white_and_of_the_expected_variance() {
         consistent += usize::from((found.low..found.high).contains(&found.normalised));
         white += usize::from(found.whiteness_p > 0.05);
     }
-    // Of 12 events of 95 %, fewer than 9 once in five thousand.
+    // Fewer than 9 of 12 events with a probability of 95 % happen once in five thousand.
     assert!(consistent >= 9 && white >= 9, "{consistent} consistent, {white} white");
 }
 

@@ -279,7 +279,7 @@ fn stretches_of_a_few_samples_have_no_effect_and_no_narrow_bounds() {
             assert_eq!(kinds(&report), ["dropped_samples"], "{what}");
             let of = coefficient(&only(&report).refitted, "angle_random_walk");
             assert!(of.low <= 1.02 * N && of.high >= 0.98 * N, "{what}: {of:?}");
-            // Of so few samples a walk is without bounds, or those include none.
+            // So few samples give a walk no bounds, or bounds that include 0.
             let walk = only(&report).refitted.terms.iter().find(|term| term.kind() == "rate_random_walk");
             let is_wide = |of: Parameter| of.high > of.value && of.low == 0.0;
             assert!(walk.is_none_or(|term| is_wide(term.coefficient())), "{what}: {walk:?}");
@@ -380,7 +380,7 @@ fn noise_below_a_count_is_told() {
     }
     let report = analyze(&gyro(vec![17; 30_000]));
     assert_eq!(kinds(&report), ["noise_below_count"], "a constant channel");
-    // Of half a count N is right, and nothing is to be told.
+    // N of half a count is right, and the report has nothing to say.
     let report = analyze(&gyro(white(1, 30_000, 0.5)));
     assert!(kinds(&report).is_empty(), "{:?}", kinds(&report));
 }

@@ -1,4 +1,4 @@
-//! What a sensor has once is the same in all its channels, and one channel has one N, B and K wherever its report shows them.
+//! A property that a sensor has once is the same in all its channels, and a channel has one N, B and K wherever its report shows them.
 
 #[path = "support/simulated_part.rs"]
 mod simulated_part;
@@ -102,7 +102,7 @@ fn one_channel_has_one_n() {
             |of: &&noise_analysis::report::assessment::Coefficient| of.kind == "angle_random_walk" && !of.discrete;
         let coefficients: Vec<&Parameter> =
             channel.assessment.coefficients.iter().filter(white).map(|of| &of.value).collect();
-        // Of gyroscopes in deg/sqrt(s), of accelerometers in ug/sqrt(Hz).
+        // Gyroscopes are in deg/sqrt(s), accelerometers in ug/sqrt(Hz).
         let (lsb, unit) = if name.starts_with("gyro") { (0.05, 1.0) } else { (3.33e-3, 1e6) };
         let used = coefficients[0];
         assert!((used.value / (unit * n(&channel.refitted.terms)) - 1.0).abs() < 1e-12, "{name}: {used:?}");

@@ -72,7 +72,7 @@ fn different_noise_is_told_and_the_joint_model_is_that_of_all() {
     assert!(!different.agree && different.joint.is_empty() && different.p_value.expect("a test") < 1e-6);
 }
 
-/// Of 100 pairs whose noise is doubled, the 95 % interval at the first octave holds 2 in 95 with a standard deviation of 2.2.
+/// The 95 % interval at the first octave holds the factor 2 in 95 of 100 pairs whose noise is doubled, with a standard deviation of 2.2.
 #[test]
 fn intervals_of_the_inflation_hold_the_truth() {
     let holds = |seed: &u64| {

@@ -468,8 +468,7 @@ impl Interpolation {
         })
     }
 
-    /// How many times louder than in the channel the noise around a sample is, by its `errors`; 1 if chance explains
-    /// it.
+    /// The noise around a sample over that of the channel, by its `errors`; 1 if chance explains it.
     fn louder_around(&self, errors: &[(usize, f64)]) -> f64 {
         let louder = |reach: usize| {
             let near = errors.iter().filter(|(distance, error)| *distance <= reach && *error != 0.0);

@@ -190,7 +190,7 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
     );
 }
 
-/// Of 200 louder samples more than fifty are beyond the limit, and a few beyond that of the noise around them.
+/// More than fifty of 200 louder samples are beyond the limit, and a few beyond that of the noise around them.
 #[test]
 fn other_spikes_make_no_spikes_of_louder_noise() {
     let mut series = Case::hiding(Vec::new(), 400.0, 9).series(GYRO);

@@ -42,7 +42,7 @@ impl TemperatureCourse {
     pub(super) fn new(series: &Series, width: u64) -> Option<Self> {
         let width = (width / FRACTIONS).max(1);
         let first = *series.values.first().filter(|_| series.unit == "degC")?;
-        // Where samples are missing, the temperature is the last one that was measured.
+        // A missing temperature is the last one that was measured.
         let mut last = first;
         let mean = |(sum, count)| {
             if count > 0 {

@@ -17,7 +17,7 @@ pub struct LinearDrift {
     pub evidence: LinearDriftEvidence,
 }
 
-/// What shows a steady drift.
+/// Evidence of a steady drift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LinearDriftEvidence {

@@ -53,7 +53,7 @@ pub struct NoisyInterval {
 }
 
 impl NoisyInterval {
-    /// Whether it follows or precedes another one at less than the length of the shorter.
+    /// True if it follows or precedes another one at less than the length of the shorter.
     pub(crate) fn is_near(&self, other: &Self) -> bool {
         let length = |of: &Self| of.to_s.value - of.from_s.value;
         let reach = length(self).min(length(other));
@@ -116,7 +116,7 @@ impl Kind for LevelChange {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        // What the louder part has more than the quieter one: the model has the mean of both.
+        // The excess of the louder part over the quieter one; the model has the mean of both.
         let before = (self.time_s.value / (at.samples as f64 * at.period_s)).clamp(0.0, 1.0);
         let ratio = self.ratio.value.powi(2);
         let mean = before + (1.0 - before) * ratio;
@@ -170,11 +170,11 @@ pub struct MotionInterval {
     pub moved_s: usize,
 }
 
-/// By how much the mean of a second of a channel at rest may leave the median.
+/// The distance that the mean of a second of a channel at rest may have from the median.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MotionScale {
-    /// By how much the biases of parts differ (1 σ), by the data sheet, in the unit of the channel.
+    /// Scatter of the biases of parts (1 σ) by the data sheet, in the unit of the channel.
     BiasError(f64),
     /// The scatter of the channel's own means of a second (1 σ), where no data sheet is known, in the unit of the channel.
     Scatter(f64),

@@ -1,30 +1,30 @@
-//! What several kinds of effects were told by.
+//! Evidence that several kinds of effects share.
 
 use super::kind::{NamedParameter, named};
 use crate::bounds::BoundedEstimate;
 use serde::Serialize;
 
-/// Where the curve departs from the model without an added term.
+/// The largest departure of the curve from the model without an added term.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CurveEvidence {
     /// `σ/σ_model − 1` at the averaging time where it is most significant.
     pub excess: f64,
-    /// That averaging time, s.
+    /// Averaging time of the excess, s.
     pub tau_s: f64,
     /// The excess in standard deviations.
     pub sigmas: f64,
-    /// What the term takes off the fit, in standard deviations.
+    /// Gain of the fit by the term, in standard deviations.
     pub gain_sigmas: f64,
 }
 
-/// What shows a line.
+/// Evidence of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LineEvidence {
     pub has_width: bool,
     pub source: LineSource,
 }
 
-/// Where a line was seen.
+/// The source in which a line was seen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LineSource {
@@ -37,7 +37,7 @@ pub enum LineSource {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpectrumEvidence {
     pub frequency_hz: f64,
-    /// Whether that is half of the sample rate: an offset of every second sample.
+    /// True if that is half of the sample rate: an offset of every second sample.
     pub is_at_half_rate: bool,
     /// Full width at half maximum, Hz; `None` of a line no wider than the record resolves.
     pub width_hz: Option<f64>,

@@ -36,7 +36,7 @@ pub struct RepeatedSamples {
     /// Number of those that equal the one before.
     pub equal: u64,
     pub samples: f64,
-    /// How many chance makes equal, at most.
+    /// Most samples that chance makes equal.
     pub by_chance: f64,
     pub channels: usize,
 }
@@ -59,7 +59,7 @@ pub struct ClockDeviation {
     pub rate_hz: BoundedEstimate,
     /// As stated, or the nearest usual one.
     pub nominal_hz: f64,
-    /// How far they are apart, in standard deviations of an ordinary host's clock.
+    /// Distance of both rates in standard deviations of an ordinary host's clock.
     pub sigmas: f64,
     pub change: Option<RateChange>,
 }
@@ -104,7 +104,7 @@ pub struct Saturation {
     /// The limit with the most samples; it is exact.
     #[serde(skip)]
     pub level: ChannelEstimate,
-    /// Whether that is an end of the range.
+    /// True if that is an end of the range.
     pub is_end_of_range: bool,
     /// Number of samples at a limit.
     pub cut_off: f64,

@@ -53,7 +53,7 @@ pub struct LowPassFilter {
     pub evidence: CurveEvidence,
 }
 
-/// What a low-pass filter is made of.
+/// The design of a low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LowPassDesign {

@@ -1,4 +1,4 @@
-//! What was found: an effect with the correction that removes it from the samples, and the causes that a report lists.
+//! Findings: an effect with the correction that removes it from the samples, and the causes that a report lists.
 
 use crate::effects::Effect;
 use serde::ser::SerializeStruct;
@@ -35,7 +35,7 @@ impl Serialize for ChannelEffect {
 /// One cause of what the baseline noise model lacks, with every channel that shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// As the channel shows it that shows it most clearly.
+    /// The effect in the channel that shows it most clearly.
     pub effect: Effect,
     /// Names of the channels that show it, in the order of the report.
     pub channels: Vec<String>,
@@ -50,7 +50,7 @@ pub struct Finding {
     pub minute_percent: BTreeMap<String, f64>,
 }
 
-/// Whether a finding holds on data that its model was not fitted to.
+/// The test of a finding on data that its model was not fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Validation {
@@ -66,7 +66,7 @@ pub enum Validation {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
     pub effect: Effect,
-    /// What removes the effect from the samples; `None` where nothing can, or where the noise model has a term for it.
+    /// Removes the effect from the samples; `None` if nothing can, or if the noise model has a term for it.
     pub correction: Option<Correction>,
 }
 
@@ -80,7 +80,7 @@ impl Detection {
     }
 }
 
-/// What removes an effect from a channel's samples.
+/// A correction that removes an effect from a channel's samples.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Correction {
     /// The samples of these sample periods, in ascending order, become gaps.

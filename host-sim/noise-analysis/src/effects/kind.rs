@@ -1,4 +1,4 @@
-//! What every kind of effect says of itself.
+//! The trait of all kinds of effects: name, parameters, share of the variance.
 
 use crate::bounds::{BoundedEstimate, Parameter};
 use allan_core::NoiseTerm;
@@ -19,7 +19,7 @@ pub(crate) trait Kind {
         AddedVariance::NONE
     }
 
-    /// What it adds to the bias of its channel in each block: factors, each with the values that it multiplies. Empty for noise.
+    /// Its part of the channel's bias in each block: factors, each with the values that it multiplies. Empty for noise.
     fn course(&self, _blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
         Vec::new()
     }
@@ -30,9 +30,9 @@ pub(crate) struct NamedParameter {
     /// In tables and files.
     pub name: &'static str,
     pub parameter: Parameter,
-    /// Whether it says how large the effect is.
+    /// True if it says how large the effect is.
     pub is_size: bool,
-    /// Whether any two stretches of a record have it alike where the effect lasts. It describes the distribution of the samples, and
+    /// True if any two stretches of a record have it alike where the effect lasts. It describes the distribution of the samples, and
     /// nothing that happens once.
     pub lasts: bool,
 }
@@ -68,7 +68,7 @@ pub(crate) enum Occurrence {
 }
 
 impl Occurrence {
-    /// Whether two effects of one kind are one cause.
+    /// True if two effects of one kind are one cause.
     pub(super) fn is_one_cause(self, other: Self, is_same_unit: bool) -> bool {
         match (self, other) {
             (Self::Once, Self::Once) => true,
@@ -88,22 +88,22 @@ impl Occurrence {
 /// The Allan variance that an effect adds to a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AddedVariance {
-    /// What the channel's model has of it.
+    /// The part that the channel's model has.
     pub modelled: f64,
-    /// What the model lacks: the samples are corrected for it, or are left out.
+    /// The part that the model lacks: the samples are corrected for it, or are left out.
     pub corrected: f64,
 }
 
 impl AddedVariance {
-    /// Of an effect that adds none of its own: a filter, a clock, lost samples.
+    /// For an effect that adds no variance: a filter, a clock, lost samples.
     pub(crate) const NONE: Self = Self { modelled: 0.0, corrected: 0.0 };
 
-    /// Of an effect that the model has.
+    /// For an effect that the model has.
     pub(crate) const fn modelled(modelled: f64) -> Self {
         Self { modelled, ..Self::NONE }
     }
 
-    /// Of an effect that the samples are corrected for, or whose samples are left out.
+    /// For an effect that the samples are corrected for, or whose samples are left out.
     pub(crate) const fn corrected(corrected: f64) -> Self {
         Self { corrected, ..Self::NONE }
     }
@@ -136,17 +136,17 @@ impl AveragingTime<'_> {
         self.n as f64 * self.period_s
     }
 
-    /// Of a term of the noise model with this coefficient.
+    /// The variance of a term of the noise model with this coefficient.
     pub(crate) fn of_term(&self, term: &NoiseTerm, coefficient: f64) -> AddedVariance {
         AddedVariance::modelled(coefficient * coefficient * term.avar(self.n, self.period_s))
     }
 
-    /// Of exponentially correlated noise with this time constant, in s, and this standard deviation.
+    /// The variance of exponentially correlated noise with this time constant, in s, and this standard deviation.
     pub(crate) fn of_markov(&self, time_constant: f64, deviation: f64) -> AddedVariance {
         self.of_term(&NoiseTerm::Markov(Markov { time_constant }), deviation)
     }
 
-    /// Of `sensitivity` times a channel; none where there is no such channel.
+    /// The variance of `sensitivity` times a channel; none if there is no such channel.
     pub(crate) fn followed(&self, quantity: Quantity, axis: &str, sensitivity: f64) -> AddedVariance {
         let adev = (self.adev_of)(quantity, axis).unwrap_or(0.0);
         AddedVariance::modelled((sensitivity * adev).powi(2))

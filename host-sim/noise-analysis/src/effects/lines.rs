@@ -20,7 +20,7 @@ pub struct SinusoidalLine {
 }
 
 impl SinusoidalLine {
-    /// Whether it is at half of the sample rate: an offset of every second sample.
+    /// True if it is at half of the sample rate: an offset of every second sample.
     #[must_use]
     pub const fn is_at_half_rate(&self) -> bool {
         matches!(self.evidence.source, LineSource::Spectrum(SpectrumEvidence { is_at_half_rate: true, .. }))
@@ -92,7 +92,7 @@ pub struct SquareWave {
     #[serde(skip)]
     pub amplitude: ChannelEstimate,
     pub multiples: Multiples,
-    /// What shows the lowest of them.
+    /// Evidence of the lowest of them.
     pub line: LineEvidence,
 }
 

@@ -16,7 +16,7 @@ pub struct MarkovProcess {
     pub evidence: MarkovEvidence,
 }
 
-/// What shows a Markov process.
+/// Evidence of a Markov process.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkovEvidence {
@@ -57,7 +57,7 @@ pub struct TelegraphNoise {
     pub evidence: TelegraphEvidence,
 }
 
-/// What tells random telegraph noise from a Gaussian process of the same spectrum.
+/// Evidence of random telegraph noise against a Gaussian process of the same spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TelegraphEvidence {
@@ -83,12 +83,12 @@ impl Kind for TelegraphNoise {
 
 /// Shot noise: disturbances of one direction that begin at once and decay, at random times.
 ///
-/// Of disturbances at the rate λ (a Poisson process) with sizes A that decay as `exp(−t/T)` the autocovariance is
+/// Disturbances at the rate λ (a Poisson process) with sizes A that decay as `exp(−t/T)` have the autocovariance
 /// `λ·E[A²]·T/2·exp(−|τ|/T)` (Campbell's theorem; S. Rice, "Mathematical analysis of random noise", Bell Syst. Tech. J. 23, 1944, section
 /// 1.5), that of a first-order Markov process.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ShotNoise {
-    /// Of disturbances of one size that make up the same, 1/h.
+    /// Rate of disturbances of one size that make up the same, 1/h.
     #[serde(skip)]
     pub rate_per_hour: BoundedEstimate,
     /// Their size, at the beginning of each; below 0 where they go downwards.

@@ -26,7 +26,7 @@ impl ResponseVariance {
             let starts = (0..=length - 2 * n).step_by(width as usize);
             let square = |start: u64| (sum_at(start + 2 * n) - 2.0 * sum_at(start + n) + sum_at(start)).powi(2);
             let (sum, count) = starts.fold((0.0, 0.0), |(sum, count), start| (sum + square(start), count + 1.0));
-            // Of means, half the mean square of their differences.
+            // For means: half the mean square of their differences.
             sum / count / (2.0 * (n as f64).powi(2))
         };
         let factors = (0..u64::BITS).map(|octave| 1_u64 << octave).skip_while(|n| *n < width);

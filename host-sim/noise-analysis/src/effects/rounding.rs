@@ -67,7 +67,7 @@ pub struct NoiseBelowCount {
     pub deviation: ChannelEstimate,
     /// The same in counts.
     pub counts: f64,
-    /// From which on rounding adds white noise alone, counts.
+    /// Least deviation from which on rounding adds white noise alone, counts.
     pub dithered_counts: f64,
 }
 
@@ -80,7 +80,7 @@ impl Kind for NoiseBelowCount {
 /// Values that a converter never gives between others that it gives often: a differential non-linearity of −1 LSB (IEEE Std 1241).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MissingCodes {
-    /// How many of the codes that the record covers never occur.
+    /// Number of codes within the range of the record that never occur.
     pub codes: u32,
     /// The largest distance of which all distances between missing codes are multiples; it is exact.
     #[serde(skip)]

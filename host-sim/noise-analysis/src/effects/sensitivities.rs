@@ -236,7 +236,7 @@ pub struct SharedDrift {
     /// Name of the other channel.
     pub with: &'static str,
     pub sigmas: f64,
-    /// How many times the data sheet's sensitivity is the largest that is plausible.
+    /// The largest plausible sensitivity over the data sheet's.
     pub largest_multiple: f64,
 }
 

@@ -22,12 +22,12 @@ pub struct ModulatedLine {
     /// Time from one maximum to the next, s.
     #[serde(skip)]
     pub period_s: BoundedEstimate,
-    /// Whether the phase changes, and not the amplitude.
+    /// True if the phase changes, and not the amplitude.
     pub of_phase: bool,
     pub evidence: ModulationEvidence,
 }
 
-/// What shows that a line changes.
+/// Evidence that a line changes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModulationEvidence {
@@ -121,7 +121,7 @@ pub(crate) fn avar_of_run(amplitude: f64, [first, last]: [f64; 2], n: u64, perio
 /// A slow signal that is the same every period and no sinusoid, as of a thermostat or of a load that comes on every minute.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Periodic {
-    /// Of its fundamental, Hz.
+    /// Frequency of its fundamental, Hz.
     #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Amplitude of the fundamental.

@@ -1,4 +1,4 @@
-//! What departs from every model that the analysis knows: where, by how much, and what was seen.
+//! Departures from every model that the analysis knows: place, size and observation.
 
 use super::evidence::CurveEvidence;
 use super::kind::{Kind, NamedParameter, Occurrence, named};
@@ -8,16 +8,16 @@ use serde::Serialize;
 /// Something that no kind describes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Where it is.
+    /// Its place.
     #[serde(skip)]
     pub place: UnexplainedPlace,
-    /// By how much the deviation there exceeds that of the model, %; `None` where it is not known to better than itself.
+    /// Excess of the deviation there over that of the model, %; `None` if it is not known to better than itself.
     #[serde(skip)]
     pub excess_percent: Option<BoundedEstimate>,
     pub observation: Observation,
 }
 
-/// Where something is unexplained.
+/// The place of an unexplained departure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum UnexplainedPlace {
     /// At an averaging time, s.
@@ -28,7 +28,7 @@ pub enum UnexplainedPlace {
     Frequency(BoundedEstimate),
 }
 
-/// What was seen of something unexplained.
+/// The observation of an unexplained departure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Observation {
@@ -47,7 +47,7 @@ pub enum Observation {
     },
 }
 
-/// What contradicts a term that fits an octave of the curve.
+/// Evidence against a term that fits an octave of the curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refutation {
@@ -65,7 +65,7 @@ pub enum Refutation {
     UndecidedLevels { time_constant_s: f64, kurtosis: [f64; 2] },
 }
 
-/// What contradicts a resonance.
+/// Evidence against a resonance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BandMismatch {

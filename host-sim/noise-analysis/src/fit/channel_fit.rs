@@ -21,8 +21,8 @@ use allan_core::trace::{LineCandidates, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelId, SensorProfile};
 
-/// By how much the deviance may rise with the other channels' filter: a correct filter rises by more by chance once in 600
-/// times (χ² of one degree of freedom).
+/// Most that the deviance may rise with the other channels' filter: the right filter exceeds it by chance once in 600 times
+/// (χ² of one degree of freedom).
 pub(super) const MAX_DEVIANCE_RISE: f64 = 10.0;
 
 /// Least part that the lower bound of white noise behind a filter has of its value where no other term stands in for it.
@@ -40,7 +40,7 @@ pub(crate) struct ChannelFit {
     pub covariates: CovariateFit,
     /// Signals in the part, whose share is no part of the model with the added terms.
     pub signals: SignalShare,
-    /// What these leave of the curve of `covariates`.
+    /// The rest of the curve of `covariates` without these.
     pub curve: Curve<OCTAVES>,
     /// The baseline model, with the signals.
     pub before: Model,
@@ -54,7 +54,7 @@ pub(crate) struct ChannelFit {
     lines: Option<Vec<NoiseTerm>>,
     /// Lines of the spectrum with which the model fits the curve worse.
     refuted: Vec<NoiseTerm>,
-    /// What the coefficients of the model with added terms are fitted to.
+    /// The data that the coefficients of the model with added terms are fitted to.
     pub coefficients_from: CoefficientsFrom,
     /// Probability that chance makes the spectrum depart as far from that of the model where that has quantization; `None` where it has
     /// none, or the spectrum does not show its shape.
@@ -204,7 +204,7 @@ impl ChannelFit {
         self.traced.added().into_iter().filter_map(resonance).collect()
     }
 
-    /// Whether the noise of the first `octaves` is large enough against the channel's `resolution` (in its unit) that
+    /// True if the noise of the first `octaves` is large enough against the channel's `resolution` (in its unit) that
     /// rounding adds white noise and nothing else.
     pub(crate) fn is_dithered(&self, profile: &SensorProfile, resolution: f64, octaves: usize) -> bool {
         is_dithered(&self.covariates.curve, resolution, profile.dithered_avar_counts2, octaves)
@@ -413,12 +413,12 @@ impl ChannelFit {
         }
     }
 
-    /// Whether the curve contradicts a line of the spectrum.
+    /// True if the curve contradicts a line of the spectrum.
     pub(crate) fn refutes(&self, line: &NoiseTerm) -> bool {
         self.refuted.contains(line)
     }
 
-    /// What lines to look for behind a filter: behind a low-pass filter, which no trace had before, those of the spectrum where it has any.
+    /// The lines to look for behind a filter: behind a low-pass filter, which no trace had before, those of the spectrum if it has any.
     fn line_candidates(&self, common: &PartFilter) -> LineCandidates<'_> {
         match (&self.lines, common.term) {
             (Some(lines), NoiseTerm::LowPass(_)) if !lines.is_empty() => LineCandidates::Spectrum(lines),
@@ -455,7 +455,7 @@ impl ChannelFit {
     }
 }
 
-/// What the baseline model lacks of `curve`, with these lines of the spectrum or those that the curve itself shows.
+/// Traces what the baseline model lacks of `curve`, with these lines of the spectrum or those that the curve itself shows.
 fn traced_with(curve: &Curve<OCTAVES>, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Trace {
     let traced = trace(curve, LineCandidates::Spectrum(lines), filters);
     if lines.is_empty() || traced.after_goodness.p_value >= DESCRIBED {
@@ -508,7 +508,7 @@ fn behind(filtered: NoiseTerm) -> [NoiseTerm; 3] {
     [filtered, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk]
 }
 
-/// What the noise [`behind`] a filter lacks of a curve.
+/// Traces what the noise [`behind`] a filter lacks of a curve.
 fn traced_behind(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandidates) -> Trace {
     let mut traced = Trace::baseline(curve);
     traced.after = fit(curve, &behind(filtered));
@@ -517,7 +517,7 @@ fn traced_behind(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandida
     traced
 }
 
-/// Whether the spectrum has one of its `lines` beside each line of the model of a curve.
+/// True if the spectrum has one of its `lines` beside each line of the model of a curve.
 fn are_in_spectrum(by_curve: &Trace, lines: &[NoiseTerm]) -> bool {
     let is_near = |frequency: f64| {
         lines.iter().filter_map(line_frequency).any(|of| (of / frequency).ln().abs() < FREQUENCY_BY_OCTAVES)
@@ -525,7 +525,7 @@ fn are_in_spectrum(by_curve: &Trace, lines: &[NoiseTerm]) -> bool {
     by_curve.after.terms().iter().filter_map(|term| line_frequency(&term.kind)).all(is_near)
 }
 
-/// Whether a line of `model` is `line`, one of the `lines` of the spectrum: a line that was traced with the frequency of one of
+/// True if a line of `model` is `line`, one of the `lines` of the spectrum: a line that was traced with the frequency of one of
 /// them is that one alone, a line of the curve's own is any within the reach of octaves.
 fn has_line(model: &Model, line: &FittedTerm, lines: &[FittedTerm]) -> bool {
     let is_near = |a: f64, b: f64, part: f64| (a - b).abs() < part * b;
@@ -679,7 +679,7 @@ mod tests {
             let (_, (low, high)) = shaped.model().terms()[1].shape.named().next().expect("a time constant");
             held += usize::from((low..=high).contains(&TIME_CONSTANT_S));
         }
-        // Of ten intervals of 95 % fewer than seven hold in one of a thousand cases.
+        // Fewer than seven of ten 95 % intervals hold in one of a thousand cases.
         assert!(held >= 7, "{held}");
     }
 }

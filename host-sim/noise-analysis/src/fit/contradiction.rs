@@ -1,4 +1,4 @@
-//! Where a curve contradicts a model, also at averaging times with few degrees of freedom.
+//! The place at which a curve contradicts a model, also at averaging times with few degrees of freedom.
 //!
 //! A deviation in standard deviations hides a model that is several times the measurement at the longest averaging times: a
 //! variance with four degrees of freedom cannot be more than 3.5 cube-root standard deviations below any model. The exact

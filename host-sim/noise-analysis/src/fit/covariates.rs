@@ -19,7 +19,7 @@ struct RegressionData {
     channels: Vec<ChannelId>,
     covariates: Vec<Covariate<OCTAVES>>,
     with_channel: Vec<CovarianceCurve<OCTAVES>>,
-    /// Of covariate `i` with covariate `j < i`, at index `i·(i−1)/2 + j`.
+    /// Covariance of covariate `i` with covariate `j < i`, at index `i·(i−1)/2 + j`.
     mutual: Vec<CovarianceCurve<OCTAVES>>,
 }
 
@@ -111,7 +111,7 @@ impl CovariateFit {
         &self.data.rounding
     }
 
-    /// Whether the channel depends on no covariate.
+    /// True if the channel depends on no covariate.
     pub(crate) fn is_empty(&self) -> bool {
         self.sensitivities.is_empty()
     }
@@ -122,7 +122,7 @@ impl CovariateFit {
             .regress(|regression| regression.compensated(&self.sensitivities))
     }
 
-    /// What the covariates add to the channel's Allan variance at each of `factors`, in ascending order, by the covariances in
+    /// The part of the channel's Allan variance that the covariates add at each of `factors`, in ascending order, by the covariances in
     /// `part`.
     ///
     /// Longer averaging times than those at which the covariances are known, as of a record in two halves, have the last

@@ -18,7 +18,7 @@ const BLOCKS: u64 = 256;
 /// Fewest blocks whose scatter is known, to a half.
 const FEWEST_BLOCKS: usize = 8;
 
-/// What the spikes and knocks of a part of a recording add to the Allan variance of a channel.
+/// The Allan variance that the spikes and knocks of a part of a recording add to a channel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct EventShare {
     /// Averaging factor and share in the variance, in the unit of the channel squared.
@@ -64,7 +64,7 @@ impl EventShare {
         Self { points: difference(with, without), count, hours, relative_variance }
     }
 
-    /// Whether there are no events.
+    /// True if there are no events.
     pub(crate) fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -89,7 +89,7 @@ impl EventShare {
         1.0 / (1.0 / edf + self.relative_variance * fraction * fraction)
     }
 
-    /// What is reported of them at the averaging factors `n`; `None` where there are no events.
+    /// Their report at the averaging factors `n`; `None` without events.
     pub(crate) fn report(&self, n: impl Iterator<Item = u64>) -> Option<EventsReport> {
         let rate = |count: f64| count / self.hours;
         let (fewest, most) = poisson_bounds(self.count as f64);
@@ -102,7 +102,7 @@ impl EventShare {
     }
 }
 
-/// What the events of a curve add to it, where that is positive.
+/// The variance that the events add to a curve, where that is positive.
 fn difference(with: &Curve<OCTAVES>, without: &Curve<OCTAVES>) -> Vec<(u64, f64)> {
     let share = |point: &AllanPoint| {
         let other = without.points().iter().find(|of| of.n == point.n)?;

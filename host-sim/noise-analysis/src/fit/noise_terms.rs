@@ -1,4 +1,4 @@
-//! What the terms of a noise model are: white noise, filters, lines.
+//! Classes of the terms of a noise model: white noise, filters, lines.
 
 use crate::bounds::BoundedEstimate;
 use crate::samples::rounding::Rounding;
@@ -11,22 +11,22 @@ use std::f64::consts::PI;
 /// either is known to a factor of 2.
 const SAME_TIME_OCTAVES: f64 = 2.0;
 
-/// Whether two time constants, s, may be those of one process.
+/// True if two time constants, s, may be those of one process.
 pub(crate) fn is_same_time(one_s: f64, other_s: f64) -> bool {
     (one_s / other_s).log2().abs() <= SAME_TIME_OCTAVES
 }
 
-/// Whether a term is white noise behind a filter.
+/// True if a term is white noise behind a filter.
 pub(crate) fn is_filter(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_))
 }
 
-/// Whether a term is white noise, filtered or not.
+/// True if a term is white noise, filtered or not.
 pub(crate) fn is_white(kind: &NoiseTerm) -> bool {
     is_filter(kind) || *kind == NoiseTerm::AngleRandomWalk
 }
 
-/// Whether a term is a line.
+/// True if a term is a line.
 pub(crate) fn is_line(kind: &NoiseTerm) -> bool {
     line_frequency(kind).is_some()
 }

@@ -105,7 +105,7 @@ pub(crate) fn with_bounds_behind_a_filter(
     let widened = |term: &FittedTerm| {
         let position = present.iter().position(|known| std::ptr::eq(*known, term));
         let Some(position) = position.filter(|_| is_white(&term.kind)) else { return *term };
-        // Of the squared coefficient, whose relative error is twice that of the coefficient.
+        // The covariance is that of the squared coefficient, whose relative error is twice the coefficient's.
         let half_width = NORMAL_975 * covariance[(position, position)].sqrt() / 2.0;
         let low = term.value * (1.0 - half_width).max(0.0);
         term.with_bounds(term.low.min(low), term.high.max(term.value * (1.0 + half_width)))
@@ -113,7 +113,7 @@ pub(crate) fn with_bounds_behind_a_filter(
     Model::new(model.sample_period(), model.terms().iter().map(widened))
 }
 
-/// Whether a parameter of the shape of a filter is the one that a fit adjusts.
+/// True if a parameter of the shape of a filter is the one that a fit adjusts.
 pub(crate) fn is_adjusted_of_filter(kind: &NoiseTerm, name: &str) -> bool {
     matches!((kind, name), (NoiseTerm::Filtered(_), "decimation") | (NoiseTerm::LowPass(_), "frequency"))
 }

@@ -39,8 +39,8 @@ const CHANNELS_FOR_MAJORITY: usize = 3;
 pub(crate) struct PartFilter {
     /// White noise behind it.
     pub term: NoiseTerm,
-    /// What is adjusted of it, with 95 % bounds. Of moving averages the values of the sensor's clock from one sample to the next, exactly 1
-    /// where every value is recorded; of a low-pass filter its frequency, Hz.
+    /// Its adjusted parameter, with 95 % bounds. Moving averages: the values of the sensor's clock from one sample to the next, exactly 1
+    /// if every value is recorded. A low-pass filter: its frequency, Hz.
     pub adjusted: BoundedEstimate,
     /// Number of dithered channels that show it, of all dithered ones.
     pub shown: (usize, usize),
@@ -70,7 +70,7 @@ pub(crate) fn estimate(
     (filters, may_be_low_pass): (&[MovingAverageFilter], bool),
     nominal_decimation: f64,
 ) -> Result<PartFilter, Unidentified> {
-    // Where more than half of the samples of an octave were replaced from their neighbours, these correlate by that.
+    // Samples that were replaced from their neighbours are correlated: half of them or more hide the filter.
     let is_measured = |curve: &Curve<OCTAVES>| curve.points().iter().all(|point| point.replaced < 0.5);
     let dithered = channels.iter().filter(|channel| channel.is_dithered && is_measured(channel.curve));
     let dithered: Vec<&FilteredChannel> = dithered.collect();
@@ -107,7 +107,7 @@ struct JointSpectra<'a> {
 impl<'a> JointSpectra<'a> {
     /// Channels whose deviances fall with moving averages, together and in the majority, by more than chance explains.
     fn that_show_one(spectra: &'a [ChannelSpectrum], averages: &[TriedFamily]) -> Result<Self, Unidentified> {
-        // By chance one of the hypotheses, each with an amplitude and a decimation, falls as much in one of 1/SIGNIFICANCE records.
+        // Chance lets one of the hypotheses, each with an amplitude and a decimation, fall as much in one of 1/SIGNIFICANCE records.
         let required = chi_squared_quantile(1.0 - SIGNIFICANCE / averages.len().max(1) as f64, 2.0);
         let unfiltered = in_parallel(spectra, ChannelSpectrum::unfiltered);
         let tried = averages.iter().flat_map(TriedFamily::deviances).fold(unfiltered.clone(), lesser);
@@ -199,8 +199,8 @@ fn weights(spectra: &[ChannelSpectrum], lowest: &[f64]) -> Vec<f64> {
     spectra.iter().zip(lowest).map(|(channel, lowest)| (channel.bands() / lowest).min(1.0)).collect()
 }
 
-/// By how much channels differ among themselves: the sum of the `rises` of their deviances over its expectation, at least 1
-/// (R. Birge, Phys. Rev. 40, 1932).
+/// Disagreement of the channels: the sum of the `rises` of their deviances over its expectation, at least 1 (R. Birge, Phys.
+/// Rev. 40, 1932).
 fn birge_ratio(rises: &[f64]) -> f64 {
     (rises.iter().sum::<f64>() / (rises.len() as f64 - 1.0).max(1.0)).max(1.0)
 }
@@ -238,7 +238,7 @@ mod tests {
         estimated_from(&recorded, (&profile, rate_hz))
     }
 
-    /// Of three channels that were recorded at `rate_hz`.
+    /// Estimates the filter of three channels that were recorded at `rate_hz`.
     fn estimated_from(
         recorded: &[Vec<i32>; 3],
         (profile, rate_hz): (&SensorProfile, f64),
@@ -299,7 +299,7 @@ mod tests {
         })
     }
 
-    /// Of eight intervals of 95 % six or more hold in 99.4 % of cases. Bartlett windows and white noise of a sensor that may have a low-pass
+    /// Six or more of eight 95 % intervals hold in 99.4 % of cases. Bartlett windows and white noise of a sensor that may have a low-pass
     /// filter have none.
     #[test]
     fn two_stages_are_told_from_moving_averages() {

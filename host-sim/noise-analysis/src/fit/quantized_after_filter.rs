@@ -51,7 +51,7 @@ mod tests {
         NoiseTerm::AngleRandomWalk,
     ];
 
-    /// What is taken in white noise of the deviation 100 before a filter of two averages over two values, and what `added` makes after it.
+    /// The model that is adopted for white noise of the deviation 100 before a filter of two averages over two values, and `added` after it.
     fn taken(seed: u64, mut added: impl FnMut(&mut ChaCha8Rng) -> f64) -> Option<TracedModel> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut last = [0.0; 2];

@@ -15,7 +15,7 @@ const SAME_DURATION: f64 = 0.01;
 const LEAST_SEGMENTS: usize = 16;
 const LONGEST_SEGMENT: usize = 2048;
 
-/// What the coefficients of a model are fitted to.
+/// The data that the coefficients of a model are fitted to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CoefficientsFrom {
@@ -155,7 +155,7 @@ mod tests {
         }
     }
 
-    /// Of true quantization, with half of the power, one in 5,000 is refuted by chance: of 60 more than one in 14,000 cases. A band
+    /// True quantization with half of the power is refuted by chance in one of 5,000 cases: more than one of 60 is, in one of 14,000. A band
     /// at 0.45 of the sample rate, a tenth of it wide and of a third of the power, raises the curve at one sample as well.
     #[test]
     fn the_spectrum_tells_quantization_from_a_band() {

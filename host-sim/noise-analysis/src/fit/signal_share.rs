@@ -13,25 +13,25 @@ use allan_core::{AllanPoint, Curve, Model};
 
 /// Amplitudes that are tried, in parts of the way from the estimate to either 95 % bound: half of that is a standard deviation.
 const STEPS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
-/// What the signals in a part of a recording add to the Allan variance of a channel.
+/// The Allan variance that the signals in a part of a recording add to a channel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct SignalShare {
     periodic: Option<Harmonics>,
     run: Option<Run>,
 }
 
-/// Of a periodic signal.
+/// The share of a periodic signal.
 #[derive(Debug, Clone, PartialEq)]
 struct Harmonics {
-    /// Of the fundamental, Hz.
+    /// Frequency of the fundamental, Hz.
     frequency: f64,
-    /// From that of the fundamental on, in the unit of the channel.
+    /// Amplitudes from that of the fundamental on, in the unit of the channel.
     amplitudes: Vec<f64>,
     /// Factors from the amplitudes to their bounds.
     bounds: [f64; 2],
 }
 
-/// Of a line whose frequency runs.
+/// The share of a line whose frequency runs.
 #[derive(Debug, Clone, PartialEq)]
 struct Run {
     amplitude: f64,
@@ -42,7 +42,7 @@ struct Run {
 }
 
 impl SignalShare {
-    /// Of the signals that a part of a recording shows.
+    /// The share of the signals that a part of a recording shows.
     pub(crate) fn new(periodic: Option<&PeriodicSignal>, track: Option<&FrequencyTrack>) -> Self {
         let harmonics = |found: &PeriodicSignal| Harmonics {
             frequency: found.frequency.value,
@@ -57,12 +57,12 @@ impl SignalShare {
         Self { periodic: periodic.map(harmonics), run: track.map(run) }
     }
 
-    /// Whether there are no signals.
+    /// True if there are no signals.
     pub(crate) fn is_empty(&self) -> bool {
         self.periodic.is_none() && self.run.is_none()
     }
 
-    /// Whether there is a line whose frequency runs.
+    /// True if there is a line whose frequency runs.
     pub(crate) fn has_run(&self) -> bool {
         self.run.is_some()
     }
@@ -108,8 +108,8 @@ impl SignalShare {
         self.periodic.as_ref().map_or(0.0, of_periodic) + self.run.as_ref().map_or(0.0, of_run)
     }
 
-    /// What they leave of a curve: of every point at least a tenth. The scatter of a point stays that of what was measured, so that one
-    /// which they have most of says little of the noise.
+    /// The rest of a curve without them: at least a tenth of every point. A point keeps its measured scatter, so one that is mostly
+    /// signal says little of the noise.
     pub(crate) fn left_of(&self, curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
         let mut left = curve.clone();
         if !self.is_empty() {

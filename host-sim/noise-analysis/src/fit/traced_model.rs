@@ -28,7 +28,7 @@ const LEAST_EDF: f64 = 3.0;
 /// Probability that a truth is above its upper 95 % bound.
 const BEYOND_A_BOUND: f64 = 0.025;
 
-/// What added a term to the baseline model.
+/// The origin of a term that was added to the baseline model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Addition {
     /// Decrease of the deviance, in units of its scatter: the square of a significance in standard deviations.
@@ -57,10 +57,10 @@ pub(crate) enum Shapes {
 #[derive(Debug, Clone)]
 pub(crate) struct TracedModel {
     model: Model,
-    /// Of each term of the model.
+    /// The origin of each term of the model.
     additions: Vec<Option<Addition>>,
     pub goodness: Goodness,
-    /// What is known of the adjusted shape of the filter that all channels have: its decimation, or its frequency.
+    /// Bounds of the adjusted shape of the filter that all channels have: its decimation, or its frequency.
     of_filter: Option<BoundedEstimate>,
 }
 
@@ -114,12 +114,12 @@ impl TracedModel {
         added
     }
 
-    /// Whether it has a filter.
+    /// True if it has a filter.
     pub(crate) fn has_filter(&self) -> bool {
         self.model.terms().iter().any(|term| is_filter(&term.kind))
     }
 
-    /// Whether another term has room.
+    /// True if another term has room.
     pub(crate) fn has_room(&self) -> bool {
         self.model.terms().len() < MAX_TERMS
     }
@@ -129,12 +129,12 @@ impl TracedModel {
         self.goodness.deviance + self.cost_of_terms()
     }
 
-    /// What the added terms must take off the deviance at least.
+    /// The least gain of deviance that justifies the added terms.
     pub(crate) fn cost_of_terms(&self) -> f64 {
         COST_OF_A_TERM * self.additions.iter().flatten().count() as f64
     }
 
-    /// What adds a term behind all others.
+    /// The origin of a term that is added behind all others.
     pub(crate) fn next_addition(&self, score: f64, residual: Residual) -> Addition {
         let rank = self.additions.iter().flatten().map(|addition| addition.rank + 1).max().unwrap_or(0);
         Addition { score, residual, rank }
@@ -152,14 +152,14 @@ impl TracedModel {
         Self::fit(curve, terms, shapes).bounded(curve, self.of_filter)
     }
 
-    /// Without the term at a position, fitted to `curve`.
+    /// The model without the term at a position, fitted to `curve`.
     pub(crate) fn removed(&self, curve: &Curve<OCTAVES>, removed: usize) -> Self {
         let kept: Vec<PlannedTerm> =
             self.terms().enumerate().filter(|(at, _)| *at != removed).map(|(_, term)| term).collect();
         self.replaced(curve, &kept, Shapes::OfProcesses)
     }
 
-    /// With one more term, the last one, fitted to `curve` with all shapes as they are. Of that term `bounds` makes what is known of it
+    /// The model with one more term at its end, fitted to `curve` with all shapes as they are. `bounds` gives that term its bounds from
     /// elsewhere. `None` if the curve gives it no variance.
     pub(crate) fn added_to(
         &self,
@@ -208,12 +208,12 @@ impl TracedModel {
         Self { of_filter: self.of_filter, ..Self::fit(&left_by(lines, curve), &terms, Shapes::OfProcesses) }
     }
 
-    /// With the coefficients and the bounds of `model`, which has the same terms.
+    /// The model with the coefficients and bounds of `model`, which has the same terms.
     pub(crate) fn with_coefficients(self, curve: &Curve<OCTAVES>, model: Model) -> Self {
         Self { goodness: goodness(curve, &model), model, ..self }
     }
 
-    /// Without the term at a position; the others are as they were, to be fitted [with lines](Self::with_lines).
+    /// The model without the term at a position; the others are unchanged, to be fitted [with lines](Self::with_lines).
     pub(crate) fn before_lines_without(&self, removed: usize) -> Self {
         let is_kept = |at: &usize| *at != removed;
         let kept = (0..self.additions.len()).filter(is_kept);
@@ -262,7 +262,7 @@ fn share(line: &FittedTerm, point: &AllanPoint, period_s: f64) -> f64 {
     line.value * line.value * line.kind.avar(point.n, period_s)
 }
 
-/// What `lines` leave of `curve`.
+/// The rest of `curve` without `lines`.
 fn left_by(lines: &[FittedTerm], curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
     let mut others = curve.clone();
     let shares = |point: &AllanPoint| lines.iter().map(|line| share(line, point, curve.sample_period())).sum::<f64>();
@@ -275,7 +275,7 @@ fn left_by(lines: &[FittedTerm], curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
 /// smallest of these limits; that of one that it shows is at the level of the smallest of so many bounds.
 pub(crate) fn within_measured(model: &Model, curve: &Curve<OCTAVES>) -> Model {
     let from = LONG_AGAINST_FILTER * filter_length_s(model).max(curve.sample_period());
-    // With fewer degrees of freedom, and of counts that repeat, the measured bounds are none.
+    // Few degrees of freedom and counts that repeat give no measured bounds.
     let has_bounds = |point: &&AllanPoint| point.edf >= LEAST_EDF && point.avar > 0.0;
     let points: Vec<&AllanPoint> = curve.points().iter().filter(|point| point.tau >= from).filter(has_bounds).collect();
     let limit = |kind: &NoiseTerm, bound: &dyn Fn(&AllanPoint) -> f64| {
@@ -347,7 +347,7 @@ mod tests {
                 assert!(k.high <= upper * (3.0 / point.tau).sqrt() * (1.0 + 1e-9), "{k:?}");
             }
             assert!(n.high > 8.0, "seed {seed}: {n:?}");
-            // What the fit knows better stays.
+            // A bound that the fit knows better stays.
             let bounded = within_measured(&Model::new(0.01, [known]), &curve);
             assert_eq!(bounded.terms(), [known], "seed {seed}");
         }

@@ -30,11 +30,11 @@ pub(crate) struct FirstHalf {
     pub part: TracedPart,
     /// The baseline models of the first half as it was recorded, with its spikes and knocks.
     raw: PerChannel<Model>,
-    /// What these add to the models of `part`.
+    /// The share of these in the models of `part`.
     events: PerChannel<EventShare>,
 }
 
-/// How the noise of each channel changes.
+/// Changes of each channel's noise.
 pub(crate) struct Epochs {
     /// The series of [`PreprocessedRecord::series`] without what the rules of the first half exclude, in both halves.
     series: PerChannel<Series>,
@@ -115,8 +115,8 @@ impl FirstHalf {
         Self { raw, events: part.channels.map(|_| EventShare::default()), part }
     }
 
-    /// What is reported of a channel by the curves and the models of the first half and of the `whole`. Where the first half `has_rules`
-    /// for what is excluded, the errors without that are reported too.
+    /// Reports a channel by the curves and models of the first half and of the `whole`. If the first half `has_rules` for exclusions,
+    /// the errors without the excluded samples are reported too.
     pub(crate) fn report(
         &self,
         whole: &TracedPart,
@@ -240,7 +240,7 @@ impl Epochs {
         &self.series[channel]
     }
 
-    /// How the noise of each traced channel changes.
+    /// Follows the noise of each traced channel.
     pub(crate) fn nonstationarities(
         &self,
         record: &PreprocessedRecord,

@@ -29,7 +29,7 @@ pub(crate) struct PreprocessedRecord<'a> {
 }
 
 impl<'a> PreprocessedRecord<'a> {
-    /// What the samples of `record` show.
+    /// Collects the evidence in the samples of `record`.
     pub(crate) fn new(record: &'a CondensedRecord<'a>) -> Self {
         let preprocessing = Preprocessing::detect(record, None);
         let estimators = RecordEstimators::estimate(record, &preprocessing);
@@ -82,7 +82,7 @@ impl<'a> PreprocessedRecord<'a> {
         })
     }
 
-    /// Whether the rules of the first half leave out samples of a channel.
+    /// True if the rules of the first half leave out samples of a channel.
     pub(crate) fn has_rules(&self, channel: ChannelId) -> bool {
         let is_screened = self.record.channels[channel].samples.is_screened;
         is_screened || self.preprocessing.excludes(channel, Exclusion::ByFirstHalf)

@@ -34,7 +34,7 @@ use allan_core::regression::Sensitivity;
 use measurement::{ChannelId, PerChannel, SensorProfile};
 use std::sync::Arc;
 
-/// What a part of a recording is fitted from.
+/// The data that a part of a recording is fitted from.
 pub(crate) struct PartData<'a> {
     pub profile: &'a SensorProfile,
     pub curves: &'a RecordPart,
@@ -46,15 +46,15 @@ pub(crate) struct PartData<'a> {
 pub(crate) struct PartSamples<'a> {
     pub record: &'a CondensedRecord<'a>,
     pub series: &'a PerChannel<Series>,
-    /// What block means show of each channel.
+    /// Findings in the block means of each channel.
     pub biases: PerChannel<BiasByBlocks>,
     /// Another part, which may have the same samples: what they show is then known.
     pub known: Option<&'a TracedPart>,
-    /// Whether two levels are looked for, which the model has as a Markov process.
+    /// True if two levels are looked for, which the model has as a Markov process.
     pub seeks_levels: bool,
 }
 
-/// What the block means of a channel show.
+/// Findings in the block means of a channel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BiasByBlocks {
     pub has_ramp: bool,
@@ -152,8 +152,8 @@ impl TracedPart {
         }
     }
 
-    /// What the model of a channel proposes, and what that leaves unexplained of the curve; `common` is the drift that the channel has in
-    /// common with others.
+    /// The proposals of a channel's model, and the part of the curve that they leave unexplained; `common` is the drift that the channel
+    /// has in common with others.
     pub(crate) fn proposals(
         &self,
         profile: &SensorProfile,

@@ -40,8 +40,8 @@ pub struct CommonModeRegression {
     pub channels: Vec<String>,
     /// Averaging time at which the weights were estimated, s: the longest one with enough degrees of freedom.
     pub weights_tau_s: f64,
-    /// By channel: whether the weights of the first quarter reduce the variance of the second quarter at
-    /// `weights_tau_s`, which decides whether they are used.
+    /// By channel: true if the weights of the first quarter reduce the variance of the second quarter at
+    /// `weights_tau_s`. Only then are they used.
     pub trusted: Vec<bool>,
     /// Octave by octave, in the first half.
     pub shares: Vec<OctaveShares>,

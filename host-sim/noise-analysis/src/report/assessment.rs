@@ -33,11 +33,11 @@ pub struct Assessment {
     /// Why there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients_note: Option<String>,
-    /// What that model was fitted to.
+    /// The data that the model was fitted to.
     pub coefficients_from: CoefficientsFrom,
     /// Error of the integrated channel without aiding.
     pub drift: Vec<NavigationDrift>,
-    /// Of a Kalman filter built from the model, on the second half of the record.
+    /// Innovations of a Kalman filter built from the model, on the second half of the record.
     pub innovations: Option<Innovations>,
     /// Record length at which each coefficient is known to ±20 % by a fit to all of it.
     pub record: Vec<RecordLength>,
@@ -48,7 +48,7 @@ pub struct Assessment {
 pub struct Coefficient {
     /// Such as `angle_random_walk`.
     pub kind: String,
-    /// Whether it is a standard deviation of samples at the record's rate, instead of a coefficient of the continuous process.
+    /// True if it is a standard deviation of samples at the record's rate, instead of a coefficient of the continuous process.
     pub discrete: bool,
     /// In its unit, with 95 % bounds.
     #[serde(flatten)]
@@ -87,7 +87,7 @@ pub struct RecordLength {
 pub struct AssessedModels<'a> {
     /// Fitted to the whole record: the model that people use.
     pub refitted: &'a Model,
-    /// What its coefficients are from.
+    /// The data that its coefficients are fitted to.
     pub coefficients_from: CoefficientsFrom,
     /// As `refitted`, with the share of the covariates, which the samples still have.
     pub uncompensated: &'a Model,
@@ -119,8 +119,8 @@ impl Assessment {
 }
 
 impl Assessment {
-    /// What the model `refitted` of a channel in `unit`, with this resolution, says of it, which was fitted to a record of `duration_s` seconds, without the
-    /// samples; whether there are any.
+    /// Assesses the model `refitted` of a channel in `unit`, with this resolution, which was fitted to a record of `duration_s` seconds. It needs
+    /// no samples, only whether there are any.
     pub(crate) fn of_model(
         refitted: &Model,
         (unit, resolution): (&str, f64),
@@ -137,7 +137,7 @@ impl Assessment {
         }
     }
 
-    /// Of a model of which nothing is known.
+    /// For a model of which nothing is known.
     fn unknown(has_samples: bool) -> Self {
         let note = if has_samples {
             "the channel never changes by a count: nothing is known of its noise but that it is below the rounding"
@@ -177,7 +177,7 @@ fn sampled_every(model: &Model, period: f64) -> Model {
             }
             kind => (kind, 1.0),
         };
-        // Of a line at a multiple of the rate of the means nothing is left.
+        // A line at a multiple of the rate of the means vanishes.
         let mut term = term.with_bounds(gain * term.low, gain * term.high);
         (term.kind, term.value) = (kind, gain * term.value);
         (gain > LEAST_GAIN).then_some(term)
@@ -185,7 +185,7 @@ fn sampled_every(model: &Model, period: f64) -> Model {
     Model::new(period, model.terms().iter().filter_map(term))
 }
 
-/// Whether the record says anything of a term: an upper bound of 0 belongs to a channel that never changes.
+/// True if the record says anything of a term: an upper bound of 0 belongs to a channel that never changes.
 fn is_known(model: &Model) -> bool {
     model.terms().iter().any(|term| term.high > 0.0)
 }

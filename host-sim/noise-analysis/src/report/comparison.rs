@@ -1,4 +1,4 @@
-//! Whether two estimates differ by more than their intervals allow, and which of many do.
+//! Tests of estimates that differ by more than their intervals allow, one pair or many.
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::upper_tail;
@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Probability that estimates of equal truths are said to differ anywhere in one comparison.
 pub const COMPARISON_SIGNIFICANCE: f64 = 0.05;
 
-/// What the second of two estimates of a noise is against the first.
+/// The verdict on the second of two estimates of a noise against the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -36,7 +36,7 @@ pub fn difference_p_value(one: &BoundedEstimate, other: &BoundedEstimate) -> f64
     2.0 * upper_tail(difference / deviation)
 }
 
-/// What each second estimate is against its first, with the p-value of their difference: the level of
+/// The verdict on each second estimate against its first, with the p-value of their difference: the level of
 /// [`COMPARISON_SIGNIFICANCE`] holds for all pairs together.
 #[must_use]
 pub fn verdicts(pairs: &[(BoundedEstimate, BoundedEstimate)]) -> Vec<(Verdict, f64)> {

@@ -1,5 +1,5 @@
-//! What the figures of a report show beside the Allan deviation: the data sheet's values, the measured spectrum and the
-//! bias over time, condensed to at most [`MOST_POINTS`] points each.
+//! Data of the figures beside the Allan deviation: the data sheet's values, the measured spectrum and the bias over time,
+//! condensed to at most [`MOST_POINTS`] points each.
 
 use crate::distributions::chi_squared_quantile;
 use crate::effects::BiasBlocks;
@@ -177,7 +177,7 @@ fn bands(welch: &Welch, range: std::ops::Range<f64>, ratio: f64) -> Vec<Spectral
             ordinates: independent,
             is_line: false,
         });
-        // Of the points of one line, the highest.
+        // One line keeps its highest point.
         let peak = lines.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         points.extend(peak.map(|(frequency, density)| SpectralPoint { frequency, density, ordinates, is_line: true }));
     }
@@ -233,7 +233,7 @@ impl<'a> BlockMeans<'a> {
         }
     }
 
-    /// What the effects of a channel explain of its bias over time; empty where they explain nothing.
+    /// The part of a channel's bias over time that its effects explain; empty if they explain nothing.
     fn followed(&self, channel: &ChannelReport, data: &FigureData) -> Vec<f64> {
         let Some(bias) = &data.bias_over_time else { return Vec::new() };
         let of = |quantity: Quantity, axis: &str| {

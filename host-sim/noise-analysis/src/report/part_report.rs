@@ -1,4 +1,4 @@
-//! What a report says of the sensor's clock and of its low-pass filter.
+//! The sensor's clock and its low-pass filter in a report.
 
 use crate::bounds::{BoundedEstimate, MeasuredValue, Parameter};
 use crate::distributions::NORMAL_975;
@@ -65,7 +65,7 @@ fn without_stamps(measurement: &Measurement, decimation: BoundedEstimate) -> Par
     PartNote::NoTimeStamps { nominal_hz, sample_rate_hz: BoundedEstimate { value, low, high }, stated_hz }
 }
 
-/// That the taps follow from the nominal clock, where the curves allow others.
+/// The note that the taps follow from the nominal clock, if the curves allow others.
 fn taps_by_clock(measurement: &Measurement, (common, filter): (&PartFilter, MovingAverageFilter)) -> Option<PartNote> {
     let PartFilter { other_taps, .. } = common;
     (!other_taps.is_empty() && filter.decimation != 1.0).then(|| PartNote::LengthAlone {

@@ -56,11 +56,11 @@ impl std::fmt::Display for IncomparableRecordings {
     }
 }
 
-/// Whether recordings show the same noise.
+/// The test for the same noise in several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseAgreement {
     pub schema: u32,
-    /// Of the first recording, Hz.
+    /// Rate of the first recording, Hz.
     pub sample_rate_hz: f64,
     /// Samples of each recording.
     pub samples: Vec<u64>,
@@ -74,7 +74,7 @@ pub struct ChannelAgreement {
     pub unit: String,
     /// Probability that recordings of the same noise differ as much; absent if no octave has enough differences.
     pub p_value: Option<f64>,
-    /// Whether the recordings show the same noise at a significance of 1 % over all channels (Holm).
+    /// True if the recordings show the same noise at a significance of 1 % over all channels (Holm).
     pub agree: bool,
     pub octaves: Vec<OctaveAgreement>,
     /// The model of all recordings together; empty where they differ.
@@ -91,11 +91,11 @@ pub struct OctaveAgreement {
     pub p_value: f64,
 }
 
-/// How much more noise there is while a machine runs.
+/// The increase of the noise while a machine runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseInflation {
     pub schema: u32,
-    /// Of the still recordings, Hz.
+    /// Rate of the still recordings, Hz.
     pub sample_rate_hz: f64,
     pub channels: Vec<ChannelInflation>,
 }

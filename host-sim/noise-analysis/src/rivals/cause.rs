@@ -3,7 +3,7 @@
 use crate::bounds::BoundedEstimate;
 use crate::effects::Effect;
 
-/// What one channel shows of a cause.
+/// The part of one channel in a cause.
 pub(super) struct Shown {
     /// Position of the channel in the report.
     pub channel: usize,

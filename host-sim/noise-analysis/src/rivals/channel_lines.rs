@@ -11,8 +11,8 @@ use measurement::SensorProfile;
 
 /// Traces what the baseline model lacks with the lines that the samples have shown; lines that come from a covariate are left out.
 ///
-/// Of a series that has means of so many samples, `faster` are the lines that it does not show, and that are known beforehand; what
-/// they look like in the series is left out.
+/// `faster` are lines, known beforehand, that a series of means over so many samples does not show at their own frequencies: their
+/// aliases are left out.
 pub(crate) fn fit_with_lines(
     covariates: CovariateFit,
     shown: &ShownBySamples,

@@ -36,7 +36,7 @@ pub(crate) struct PlatformMotion {
     quantity: Quantity,
     /// Numbers of the seconds in which the channel is moved, in ascending order.
     seconds: Vec<Range<usize>>,
-    /// Whether the channel changes faster than a Gaussian process would.
+    /// True if the channel changes faster than a Gaussian process would.
     pub is_sudden: bool,
     /// As reported.
     pub effect: MotionInterval,
@@ -90,7 +90,7 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
     Some(PlatformMotion { quantity: channel.quantity, seconds, is_sudden: is_sudden(&means), effect })
 }
 
-/// Whether one of the changes within three seconds is larger than chance has one in a Gaussian process of their median size.
+/// True if one of the changes within three seconds is larger than chance has one in a Gaussian process of their median size.
 fn is_sudden(means: &[Option<f64>]) -> bool {
     let pairs = means.iter().zip(means.iter().skip(BEGINS_WITHIN));
     let changes: Vec<f64> =
@@ -114,12 +114,12 @@ pub(crate) fn told_by_two(motions: PerChannel<Option<PlatformMotion>>) -> PerCha
 }
 
 impl PlatformMotion {
-    /// Whether both are of one quantity, and moved in the same seconds.
+    /// True if both are of one quantity, and moved in the same seconds.
     pub(crate) fn is_shared_with(&self, other: &Self) -> bool {
         self.quantity == other.quantity && self.overlaps(other)
     }
 
-    /// Whether both are moved in the same seconds.
+    /// True if both are moved in the same seconds.
     fn overlaps(&self, other: &Self) -> bool {
         let is_in = |range: &Range<usize>| other.seconds.iter().any(|of| of.start < range.end && range.start < of.end);
         self.seconds.iter().any(is_in)

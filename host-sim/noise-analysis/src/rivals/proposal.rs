@@ -13,21 +13,21 @@ pub(crate) struct Proposal {
     pub origin: Origin,
 }
 
-/// What proposes an effect.
+/// The source that proposes an effect.
 #[derive(Debug, Clone)]
 pub(crate) enum Origin {
     /// The samples: repeated ones, knocks, spikes, steps, ramps, responses.
     Samples,
     /// The means of a second, which leave their median.
     Motion {
-        /// Whether another channel of the same quantity leaves it in the same seconds.
+        /// True if another channel of the same quantity leaves it in the same seconds.
         is_shared: bool,
-        /// Whether they change faster than a Gaussian process would.
+        /// True if they change faster than a Gaussian process would.
         is_sudden: bool,
     },
     /// The regression on a covariate.
     Covariate {
-        /// Whether the sensitivity is within what is known of the sensor.
+        /// True if the sensitivity is within what is known of the sensor.
         is_plausible: bool,
     },
     /// A term that was added to the model of the curve. Several effects of one term exclude each other.
@@ -38,17 +38,17 @@ pub(crate) enum Origin {
     },
     /// Two levels in the samples.
     Levels {
-        /// Whether the samples change upwards as they change downwards.
+        /// True if the samples change upwards as they change downwards.
         is_reversible: bool,
     },
     /// The spectra of several channels.
     CrossSpectra,
     /// A line of the spectrum.
     Line {
-        /// Whether it has a few periods in the record.
+        /// True if it has a few periods in the record.
         is_slow: bool,
     },
-    /// What the model leaves of the curve.
+    /// The rest of the curve without the model.
     Residual,
     /// A signal in the samples.
     Signal(Signal),
@@ -88,7 +88,7 @@ impl Proposal {
     }
 }
 
-/// What is known of a channel beside what is proposed.
+/// The properties of a channel that decide between its proposals.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChannelFacts {
     /// Smallest distance of two values, in the channel's unit.
@@ -99,9 +99,9 @@ pub(crate) struct ChannelFacts {
     pub duration_s: f64,
     /// Allan variance of neighbouring samples.
     pub avar: f64,
-    /// Whether the noise is large enough against the resolution, at short averaging times, that rounding adds white noise alone.
+    /// True if the noise is large enough against the resolution, at short averaging times, that rounding adds white noise alone.
     pub is_dithered: bool,
-    /// Whether it is at the shortest averaging time.
+    /// True if it is at the shortest averaging time.
     pub is_dithered_at_once: bool,
     /// Change from the first tenth of the samples to the last over the time between them, in the channel's unit per s; `None` where the
     /// samples are not kept.

@@ -1,9 +1,9 @@
-//! What the model, the spectrum and the covariates of a channel propose, with bounds and with evidence that a person can check. Which of
-//! it stands is told by the [table](crate::rivals::table).
+//! Proposals by the model, the spectrum and the covariates of a channel, with bounds and with evidence that a person can check. The
+//! [table](crate::rivals::table) decides which of them stand.
 
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
-use crate::detectors::random_telegraph::{self, is_reversible};
+use crate::detectors::random_telegraph::{Law, is_reversible};
 use crate::effects::findings::{REFUTED, TOLD_APART};
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, LineEvidence,
@@ -43,7 +43,7 @@ const WIDEST_BAND: f64 = 2.0;
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
 const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
 
-/// What was found in a channel over the whole record.
+/// Findings in a channel over the whole record.
 pub(crate) struct ChannelFindings<'a> {
     pub channel: ChannelProfile,
     /// Smallest distance of two values, in the channel's unit.
@@ -61,7 +61,7 @@ pub(crate) struct ChannelFindings<'a> {
     pub rest: Option<&'a UniformSeries>,
 }
 
-/// What is proposed of a channel beyond the baseline model, but for what preprocessing found, and what decides beside it.
+/// Proposals of a channel beyond the baseline model, without those of preprocessing, and the properties that decide between them.
 pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (Vec<Proposal>, ChannelFacts) {
     let &ChannelFindings { channel, resolution, fit, lines, .. } = findings;
     let (unit, period_s) = (channel.unit, fit.after().sample_period());
@@ -174,18 +174,25 @@ fn markov_effects(
         if of.ratio - 3.0 * of.error > LARGEST_KURTOSIS_RATIO {
             effects.push(unexplained(Refutation::RareDisturbances { time_constant_s, kurtosis }));
         } else if of.is_telegraph() {
-            effects.push(telegraph_effect(term, &of, curve, unit));
-        } else if !is_gaussian(&of) && !are_samples_gaussian(findings, term, markov) {
-            effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis }));
+            // Two levels that are equally frequent are two standard deviations apart.
+            let evidence = TelegraphEvidence::Kurtosis { ratio: of.ratio, error: of.error, curve };
+            effects.push(telegraph_effect(term, 2.0, evidence, unit));
+        } else if !is_gaussian(&of) {
+            match law_by_samples(findings, term, markov) {
+                Some(Law::Gaussian) => {}
+                Some(Law::TwoLevels { jumps, gain, distance }) => {
+                    effects.push(telegraph_effect(term, distance, TelegraphEvidence::Levels { jumps, gain }, unit));
+                }
+                None => effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis })),
+            }
         }
     }
     effects
 }
 
-/// Whether the samples of a channel, without its sinusoids, say that a Markov term of its model is a Gaussian process and no two levels. They
-/// do not if anything else in them is correlated for longer than a filter's response: a band or a second process is nearer to a Gaussian
-/// process than to levels.
-fn are_samples_gaussian(findings: &ChannelFindings, term: &FittedTerm, markov: Markov) -> bool {
+/// The law of a Markov term of the model of a channel, by the samples without their sinusoids. They do not tell it if anything else in them is
+/// correlated for longer than a filter's response: a band or a second process is nearer to a Gaussian process than to levels.
+fn law_by_samples(findings: &ChannelFindings, term: &FittedTerm, markov: Markov) -> Option<Law> {
     let model = findings.fit.after();
     let is_known = |other: &FittedTerm| {
         let is_sinusoid = matches!(other.kind, NoiseTerm::Sinusoid(_));
@@ -193,14 +200,13 @@ fn are_samples_gaussian(findings: &ChannelFindings, term: &FittedTerm, markov: M
     };
     let lines = findings.lines.unwrap_or_default();
     if !model.terms().iter().all(is_known) || !lines.iter().all(MergedLine::is_sinusoid) {
-        return false;
+        return None;
     }
-    let Some(rest) = findings.rest else { return false };
-    let rest = without_sines_at(rest, lines.iter().map(|line| line.frequency.value));
-    random_telegraph::is_gaussian(&rest, term.value, markov.time_constant, filter_length_s(model))
+    let rest = without_sines_at(findings.rest?, lines.iter().map(|line| line.frequency.value));
+    Law::of_process(&rest, term.value, markov.time_constant, filter_length_s(model))
 }
 
-/// Whether a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
+/// True if a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
 fn is_gaussian(kurtosis: &KurtosisRatio) -> bool {
     (0.5 - kurtosis.ratio) / kurtosis.error.powi(2) > TOLD_APART.ln()
 }
@@ -224,13 +230,13 @@ fn kurtosis_ratio(
     telegraph::kurtosis_ratio(&estimator.curve(rest.sample_period()).scaled(step), model, markov)
 }
 
-/// Whether a term is a resonance of whose bandwidth a record of this length bounds both sides.
+/// True if a term is a resonance of whose bandwidth a record of this length bounds both sides.
 fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
     let Shape::Resonance { bandwidth: (narrowest, widest), .. } = term.shape else { return false };
     matches!(term.kind, NoiseTerm::Resonance(of) if narrowest > 1.0 / duration_s && widest < WIDEST_BAND * of.frequency)
 }
 
-/// Whether a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
+/// True if a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
 /// noise, filtered or not, is no larger than the rounding error.
 fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     let period_s = model.sample_period();
@@ -240,7 +246,7 @@ fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     markov.time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding
 }
 
-/// What the curve shows of a term that was added.
+/// Evidence of an added term in the curve.
 fn curve_evidence(found: &Addition, period_s: f64) -> CurveEvidence {
     let residual = found.residual;
     CurveEvidence {
@@ -282,21 +288,16 @@ fn filter_effect(
     .into()
 }
 
-/// A Markov term whose kurtosis is that of random telegraph noise.
-fn telegraph_effect(term: &FittedTerm, kurtosis: &KurtosisRatio, curve: CurveEvidence, unit: &'static str) -> Effect {
-    TelegraphNoise {
-        time_constant_s: shape(term, 0),
-        // Two levels that are equally frequent are two standard deviations apart.
-        amplitude: coefficient(term, unit).scaled(2.0),
-        evidence: TelegraphEvidence::Kurtosis { ratio: kurtosis.ratio, error: kurtosis.error, curve },
-    }
-    .into()
+/// A Markov term that is random telegraph noise, with levels `distance` standard deviations apart.
+fn telegraph_effect(term: &FittedTerm, distance: f64, evidence: TelegraphEvidence, unit: &'static str) -> Effect {
+    let amplitude = coefficient(term, unit).scaled(distance);
+    TelegraphNoise { time_constant_s: shape(term, 0), amplitude, evidence }.into()
 }
 
 /// A term that fits an octave of the curve and is contradicted.
 fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, term: &FittedTerm, by: Refutation) -> Effect {
     let point = curve.points().iter().find(|point| point.n == found.residual.n);
-    // Of the measured deviation at this averaging time; that of the model is taken as exact.
+    // The bound is that of the measured deviation at this averaging time; the model's is taken as exact.
     let bound = |of: fn(&AllanPoint) -> f64| point.map_or(1.0, |point| (of(point) / point.avar).sqrt());
     let percent = |factor: f64| 100.0 * ((1.0 + found.residual.excess) * factor - 1.0);
     let (low, high) = (percent(bound(|point| point.low)), percent(bound(|point| point.high)));
@@ -387,7 +388,7 @@ fn sensitivity_effect(channel: ChannelProfile, (regressor, of): &(ChannelProfile
     }
 }
 
-/// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value is at most
+/// True if a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value is at most
 /// a standard error beyond the largest plausible multiple of the data sheet's, or its interval includes zero.
 ///
 /// One of the sensor's is anywhere up to that multiple m; the ratio of a drift that both channels share is of any size, as often in one

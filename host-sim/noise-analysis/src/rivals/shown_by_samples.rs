@@ -1,4 +1,4 @@
-//! What the samples of a channel show, whatever its curve is: the lines of their spectrum, and signals.
+//! Evidence in the samples of a channel, independent of its curve: the lines of their spectrum, and signals.
 //!
 //! The first half of a record is traced twice, as a part of it and as a record of its own. Most of its channels have the same samples in
 //! both, and what these show is looked for once.
@@ -11,7 +11,7 @@ use crate::spectra::spectral_lines::{self, MergedLine};
 use allan_core::Model;
 use measurement::SensorProfile;
 
-/// What the samples of a channel show.
+/// Evidence in the samples of a channel.
 pub(crate) struct ShownBySamples {
     /// The samples, and the same less the covariates, if the channel depends on any.
     pub series: Series,
@@ -27,7 +27,7 @@ pub(crate) struct ShownBySamples {
 }
 
 impl ShownBySamples {
-    /// Of a `series` of samples, or of means of so many of them; the `rest` of it, less the covariates, is `uniform`.
+    /// Searches a `series` of samples, or of means over so many of them; the `rest` of it, less the covariates, is `uniform`.
     pub(crate) fn find(
         series: &Series,
         rest: Option<&Series>,
@@ -49,7 +49,7 @@ impl ShownBySamples {
         }
     }
 
-    /// Whether it was found in the same samples of the same sensor.
+    /// True if it was found in the same samples of the same sensor.
     pub(crate) fn is_of(&self, series: &Series, rest: Option<&Series>, rounding: &Rounding) -> bool {
         self.series == *series && self.rest.as_ref() == rest && self.rounding == *rounding
     }

@@ -41,7 +41,7 @@ pub(crate) struct SpectrumProposals {
     pub decays: Option<DecayingDisturbances>,
     /// Frequencies of the resonances of the curve, Hz, with what they take off its deviance.
     pub bands_of_curve: Vec<(f64, f64)>,
-    /// Of the spectrum.
+    /// Resolution of the spectrum, Hz.
     pub resolution_hz: f64,
 }
 

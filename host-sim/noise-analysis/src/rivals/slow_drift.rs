@@ -34,7 +34,7 @@ pub(crate) fn common_mode(
     Some(ChannelsInCommon { channels, names, gain, drift })
 }
 
-/// How far the means of the first and of the last tenth of a series are apart over the time between them, in its unit per s.
+/// Difference of the means of the last and of the first tenth of a series over the time between them, in its unit per s.
 pub(crate) fn slope_of_ends(series: &Series) -> f64 {
     let (values, tenth) = (&series.values, series.values.len() / 10);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;

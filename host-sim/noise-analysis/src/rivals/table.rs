@@ -42,9 +42,9 @@ const LEAKAGE_GAIN: f64 = 0.1;
 
 /// One row of the table.
 pub struct Rivalry {
-    /// What stands.
+    /// The claim that stands.
     pub stands: &'static str,
-    /// What is not reported beside it.
+    /// The claim that is not reported beside it.
     pub instead_of: &'static str,
     /// Under which condition.
     pub condition: &'static str,
@@ -53,15 +53,15 @@ pub struct Rivalry {
     rule: Rule,
 }
 
-/// Whether a claim loses.
+/// The condition under which a claim loses.
 enum Rule {
-    /// Of a line of the spectrum, before the model is fitted with it.
+    /// Decides on a line of the spectrum, before the model is fitted with it.
     Line(fn(&LineClaim) -> bool),
-    /// Of lines and signals, before the model takes the lines.
+    /// Decides on lines and signals, before the model takes the lines.
     Spectrum(fn(&SpectrumClaim, &SpectrumProposals) -> bool),
-    /// Of the effects of one channel.
+    /// Decides on the effects of one channel.
     Channel(fn(&Claim) -> bool),
-    /// Of one channel's part in a cause.
+    /// Decides on one channel's part in a cause.
     Cause(fn(&CauseClaim) -> bool),
 }
 
@@ -92,11 +92,11 @@ struct Claim<'a> {
     facts: &'a ChannelFacts,
 }
 
-/// What a channel shows of a cause.
+/// The part of a channel in a cause.
 pub(super) struct CauseClaim<'a> {
     pub effect: &'a Effect,
     pub channel: usize,
-    /// How many channels show the cause; `None` where that is not known.
+    /// Number of channels that show the cause; `None` if it is not known.
     pub shown_by: Option<usize>,
     /// The causes that have lines.
     pub periodic: &'a [Cause],
@@ -139,7 +139,7 @@ pub static RIVALRIES: [Rivalry; 51] = [
     row("slow periodic signal", "shot noise", "always", "its falls begin at once, as they do",
         Rule::Spectrum(|claim, all| matches!(claim, SpectrumClaim::Decays) && all.periodic.is_some())),
 
-    // What the samples of one channel show.
+    // Rows on the samples of one channel.
     row("irreversible changes", "telegraph noise of the samples", "the samples change upwards as they do not change downwards",
         "two levels are the same when time runs backwards",
         Rule::Channel(|of| matches!(of.origin(), Origin::Levels { is_reversible: false }))),
@@ -229,7 +229,7 @@ pub static RIVALRIES: [Rivalry; 51] = [
                 Origin::Covariate { .. } | Origin::Term { .. } | Origin::Levels { .. } | Origin::CrossSpectra)
             && !of.kind().is_some_and(|kind| is_filter(&kind)) && !is_shown(of.effect(), of.facts.duration_s))),
 
-    // What several stages see of one thing.
+    // Rows on one thing that several stages see.
     row("lag or curvature of the temperature", "sensitivity to temperature", "always", "the response that is not proportional has it",
         Rule::Channel(|of| matches!(of.effect(), Effect::TemperatureSensitivity(_)) && of.others().any(|other|
             matches!(other.effect, Effect::ThermalLag(_) | Effect::TemperatureCurvature(_))))),
@@ -324,7 +324,7 @@ pub static RIVALRIES: [Rivalry; 51] = [
         Rule::Cause(|of| matches!(of.effect, Effect::TelegraphNoise(telegraph) if of.is_of_period(telegraph)))),
 ];
 
-/// Whether a line of the spectrum stands.
+/// True if a line of the spectrum stands.
 pub(crate) fn stands_as_line(claim: &LineClaim) -> bool {
     !RIVALRIES.iter().any(|row| row.applies_to_line(claim))
 }
@@ -343,7 +343,7 @@ pub(crate) fn standing(proposals: Vec<Proposal>, facts: &ChannelFacts) -> Vec<Ef
     merged_axes(standing.into_iter().map(|proposal| proposal.effect))
 }
 
-/// Whether what a channel shows is a cause of its own.
+/// True if what a channel shows is a cause of its own.
 pub(super) fn stands_as_cause(claim: &CauseClaim) -> bool {
     !RIVALRIES.iter().any(|row| row.applies_to_cause(claim))
 }
@@ -426,17 +426,17 @@ impl<'a> Claim<'a> {
         }
     }
 
-    /// Whether one of the effects of the same term, this one among them, is such.
+    /// True if one of the effects of the same term, this one among them, is such.
     fn term_has(&self, is_such: impl Fn(&Effect) -> bool) -> bool {
         self.term().is_some_and(|term| self.all.iter().any(|of| of.term() == Some(term) && is_such(&of.effect)))
     }
 
-    /// Whether it is not such an effect, and another one of the same term is.
+    /// True if it is not such an effect, and another one of the same term is.
     fn loses_to(&self, is_such: impl Fn(&Effect) -> bool) -> bool {
         !is_such(self.effect()) && self.term_has(is_such)
     }
 
-    /// Whether it is of a Markov process or a ramp of the curve.
+    /// True if it is of a Markov process or a ramp of the curve.
     fn is_slow_term(&self) -> bool {
         matches!(self.kind(), Some(NoiseTerm::Markov(_) | NoiseTerm::RateRamp))
     }
@@ -480,7 +480,7 @@ impl<'a> Claim<'a> {
         self.others().filter(|other| matches!(other.origin, Origin::Line { .. })).map(|other| &other.effect)
     }
 
-    /// Whether the spectrum has the line of the curve at a frequency, Hz, which its octaves tell to some tenths.
+    /// True if the spectrum has the line of the curve at a frequency, Hz, which its octaves tell to some tenths.
     fn spectrum_has(&self, frequency: f64) -> bool {
         self.lines().any(|line| {
             let bandwidth = if let Effect::ResonantLine(of) = line { of.bandwidth_hz.value } else { 0.0 };
@@ -489,7 +489,7 @@ impl<'a> Claim<'a> {
         })
     }
 
-    /// Whether the spectrum has a line below the one of the curve at a frequency, Hz.
+    /// True if the spectrum has a line below the one of the curve at a frequency, Hz.
     fn has_line_below(&self, frequency: f64) -> bool {
         let limit = (1.0 + FREQUENCY_BY_OCTAVES) * frequency;
         self.lines().any(|line| line.frequency_hz().is_some_and(|of| of.value < limit))
@@ -539,7 +539,7 @@ impl<'a> Claim<'a> {
 }
 
 impl CauseClaim<'_> {
-    /// Whether the channel has a line in common with others within the band of a drift.
+    /// True if the channel has a line in common with others within the band of a drift.
     fn is_line_within(&self, drift: &CommonMode) -> bool {
         let is_within = |shown: &Shown| {
             let frequency_hz = shown.effect.frequency_hz();
@@ -549,7 +549,7 @@ impl CauseClaim<'_> {
         self.periodic.iter().any(|cause| cause.shown.len() > 1 && cause.shown.iter().any(is_within))
     }
 
-    /// Whether the channel has a periodic signal that may have the two levels.
+    /// True if the channel has a periodic signal that may have the two levels.
     fn is_of_period(&self, levels: &TelegraphNoise) -> bool {
         let BoundedEstimate { low, high, .. } = levels.time_constant_s;
         let has_levels = |shown: &Shown| match &shown.effect {
@@ -563,7 +563,7 @@ impl CauseClaim<'_> {
     }
 }
 
-/// Whether the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of `duration_s`
+/// True if the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of `duration_s`
 /// seconds.
 fn is_shown(effect: &Effect, duration_s: f64) -> bool {
     let time_constant_s = match effect {
@@ -573,12 +573,12 @@ fn is_shown(effect: &Effect, duration_s: f64) -> bool {
         _ => None,
     };
     let excludes_0 = |of: BoundedEstimate| of.low > 0.0 || of.high < 0.0;
-    // Of several axes some may be 0, and the size of what is unexplained is told as it is.
+    // One of several axes may be 0, and an unexplained departure is reported with the size that it has.
     let may_be_0 = matches!(effect, Effect::AccelerationSensitivity(_) | Effect::Unexplained(_));
     time_constant_s.is_none_or(|of| of.value < duration_s) && (may_be_0 || effect.sizes().all(excludes_0))
 }
 
-/// What contradicts a term of the curve.
+/// Evidence against a term of the curve.
 fn refutation(effect: &Effect) -> Option<&Refutation> {
     match effect {
         Effect::Unexplained(Unexplained { observation: Observation::RefutedTerm { by, .. }, .. }) => Some(by),
@@ -590,14 +590,14 @@ fn is_absent_in_spectrum(effect: &Effect) -> bool {
     matches!(refutation(effect), Some(Refutation::NotInSpectrum { .. }))
 }
 
-/// Whether the kurtosis of the curve decides that it is no Gaussian process.
+/// True if the kurtosis of the curve decides that it is no Gaussian process.
 fn is_by_kurtosis(effect: &Effect) -> bool {
     let is_refuted =
         matches!(refutation(effect), Some(Refutation::RareDisturbances { .. } | Refutation::UndecidedLevels { .. }));
     is_refuted || matches!(effect, Effect::TelegraphNoise(_))
 }
 
-/// Whether it is an octave of the curve, and no line.
+/// True if it is an octave of the curve, and no line.
 fn is_octave(effect: &Effect) -> bool {
     matches!(effect, Effect::Unexplained(of) if of.frequency_hz().is_none())
 }
@@ -606,7 +606,7 @@ fn telegraph(effect: &Effect) -> Option<&TelegraphNoise> {
     if let Effect::TelegraphNoise(of) = effect { Some(of) } else { None }
 }
 
-/// Whether two levels explain more than disturbances that decay as slowly, each over a Gaussian process: a normal sum of `z` standard
+/// True if two levels explain more than disturbances that decay as slowly, each over a Gaussian process: a normal sum of `z` standard
 /// deviations has a ln likelihood ratio of z²/2.
 fn are_likelier(levels: &TelegraphNoise, decays: &DecayingDisturbances) -> bool {
     let is_as_slow = is_same_time(levels.time_constant_s.value, decays.time_constant.value);

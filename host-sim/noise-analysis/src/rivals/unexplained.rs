@@ -1,5 +1,5 @@
-//! What a model leaves beyond chance: the point of the curve that contradicts it most, and a level of the noise that changes with
-//! the temperature.
+//! Departures from a model beyond chance: the point of the curve that contradicts it most, and a level of the noise that changes
+//! with the temperature.
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, ROUNDING, student_tail, upper_tail};
@@ -52,7 +52,7 @@ pub(crate) fn by_curve(
     let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
     let own = if is_dithered { 0.0 } else { resolution * resolution };
     let rounding = ROUNDING * (own + of_covariates);
-    // Of a point most of whose samples were replaced from their neighbours, the interpolation has made the greater part.
+    // Skips points that are mostly interpolated.
     let measured = curve.points().iter().filter(|point| point.replaced < 0.5);
     let residuals: Vec<Residual> = measured.filter_map(|point| residual(point, model, rounding)).collect();
     // Neighbouring octaves are nearly independent.

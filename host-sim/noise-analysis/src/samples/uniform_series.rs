@@ -188,8 +188,8 @@ impl UniformSeries {
     /// Block averages over the smallest power of two for which fewer than half of the pairs a block apart are equal:
     /// rounding then acts as noise.
     ///
-    /// Where the output stays at one step of the quantizer for several samples, the rounding error is correlated and
-    /// would show as lines.
+    /// An output that stays at one step of the quantizer for several samples has a correlated rounding error, which would show
+    /// as lines.
     pub(crate) fn averaged_until_dithered(self) -> Self {
         let equal_apart = |distance: usize| {
             let pairs = self.values.iter().zip(self.values.iter().skip(distance));

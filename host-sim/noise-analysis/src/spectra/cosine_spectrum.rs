@@ -49,7 +49,7 @@ fn bands() -> impl Iterator<Item = Range<usize>> {
 }
 
 impl CosineSpectrum {
-    /// Of `series`; `None` if it is too short, or if too many blocks have no samples.
+    /// The spectrum of `series`; `None` if it is too short, or if too many blocks have no samples.
     pub(crate) fn new(series: &UniformSeries) -> Option<Self> {
         let size = series.values().len() / BLOCKS;
         if size < LEAST_SAMPLES {

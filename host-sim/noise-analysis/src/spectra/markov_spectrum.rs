@@ -90,7 +90,7 @@ impl MarkovFit {
 mod tests {
     use super::{MarkovFit, most_likely};
 
-    /// Of ten time constants those from 8 s on leave no variance for the process, and are e⁻⁹ times as likely: they say nothing of its size.
+    /// Those of ten time constants from 8 s on leave no variance for the process, and are e⁻⁹ times as likely: they say nothing of its size.
     #[test]
     fn time_constants_without_a_process_do_not_widen_its_bounds() {
         let fit = |at: i32| MarkovFit {

@@ -7,8 +7,8 @@
 //! The cosine coefficients of white noise with a random walk are independent, so that its likelihood is exact, without a taper. That of
 //! flicker noise has the expected squares of its lowest coefficients, which [`flicker_leakage`] gives.
 //!
-//! Of a record whose means alone are kept, the coefficients of the means have the density of the samples, weighted by what a mean lets
-//! through and with its aliases.
+//! A record of which only means are kept has coefficients with the density of the samples, weighted by the response of a mean and
+//! with its aliases.
 
 use super::cosine_spectrum::flicker_leakage;
 use super::filtered_noise::FilteredNoise;
@@ -36,7 +36,7 @@ const HANN: [f64; 3] = [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0];
 const MOST_LEAKAGE: f64 = 0.1;
 /// Least part of a density that a term has where the spectrum shows its shape.
 const SHOWS_SHAPE: f64 = 0.1;
-/// Whether a term is a sinusoid, whose size is no density.
+/// True if a term is a sinusoid, whose size is no density.
 fn is_sinusoid(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Sinusoid(_))
 }
@@ -136,8 +136,8 @@ impl SampleSpectrum {
         SpectrumBehindFilter { spectrum: self, likelihood: Likelihood::new(self, kinds), saturated }
     }
 
-    /// Without the bands into whose first, middle or last coefficient behind `filter` the ends of the record leak: few
-    /// numbers make what is seen there, so that it scatters more than an average of independent coefficients.
+    /// Leaves out the bands into whose first, middle or last coefficient behind `filter` the ends of the record leak. Few
+    /// numbers make these, so they scatter more than an average of independent coefficients.
     pub(crate) fn without_leakage(mut self, filter: MovingAverageFilter) -> Self {
         let filtered = FilteredNoise::new(&filter, self.period, 1);
         let bands = std::mem::take(&mut self.bands);
@@ -145,7 +145,7 @@ impl SampleSpectrum {
         self
     }
 
-    /// Whether the ends of the record leak so much into the first, middle or last coefficient of a band where there is a density of `other`
+    /// True if the ends of the record leak so much into the first, middle or last coefficient of a band where there is a density of `other`
     /// noise too, over that of the white noise before the filter.
     fn leaks_into(&self, filtered: &FilteredNoise, place: &Place, other: f64) -> bool {
         let leaks = |order: usize| {
@@ -368,7 +368,7 @@ impl Likelihood {
             band.ordinates * (basis[term] / mixture_density(basis, &self.densities)).powi(2)
         };
         let information: f64 = self.bands.iter().zip(&self.bases).map(of_band).sum();
-        // Where the bounds would be if all other densities were known.
+        // The half-width if all other densities were known.
         let scatter = NORMAL_975 / information.sqrt();
         let (first_up, first_down) = ((density + scatter).sqrt(), (density - scatter).max(0.0).sqrt());
         // The deviate is nearly linear in the coefficient.

@@ -47,7 +47,7 @@ pub struct SampleSpectrum {
     /// Frequency of the coefficient of order 1, and distance of the points of Welch's spectrum, Hz.
     pub(super) resolution: f64,
     pub(super) point_resolution: f64,
-    /// Of the samples.
+    /// Rounding of the samples.
     pub(super) rounding: Rounding,
     /// Share of the samples that are interpolated.
     pub(super) interpolated: f64,
@@ -59,7 +59,7 @@ pub(super) struct SampleBand {
     pub(super) place: Place,
 }
 
-/// What a band is an average of.
+/// The coefficients that a band averages.
 pub(super) enum Place {
     /// Squares of the coefficients of the cosine transform, of the orders 1, 2, 3 … from index 0 on.
     Coefficients(Range<usize>),
@@ -68,7 +68,7 @@ pub(super) enum Place {
 }
 
 impl SampleSpectrum {
-    /// Of a series with `lines` at these frequencies in Hz. `None` if a long gap is missing, or if there are fewer than 1,024 samples.
+    /// The spectrum of a series with `lines` at these frequencies in Hz. `None` if a long gap is missing, or if there are fewer than 1,024 samples.
     #[must_use]
     pub fn of_samples(series: &UniformSeries, lines: &[f64]) -> Option<Self> {
         Self::of_values(series, 1, lines, f64::INFINITY)
@@ -84,7 +84,7 @@ impl SampleSpectrum {
         Some(spectrum)
     }
 
-    /// Of Welch's spectrum of samples with this rounding alone, in which also long gaps are left out; `lines` are at these frequencies in Hz.
+    /// From Welch's spectrum of samples with this rounding alone, which leaves out long gaps too; `lines` are at these frequencies in Hz.
     ///
     /// The error of the best interpolation is uncorrelated with all other samples, and its variance is the harmonic mean of the density: a share
     /// of `interpolated` samples lacks as much white noise.
@@ -111,7 +111,7 @@ impl SampleSpectrum {
         }
     }
 
-    /// Whether at most a thousandth of the samples is interpolated.
+    /// True if at most a thousandth of the samples is interpolated.
     pub(crate) fn has_all_noise(&self) -> bool {
         self.interpolated <= MOST_INTERPOLATED
     }

@@ -16,7 +16,7 @@ pub struct SpectralBand {
     pub ordinates: f64,
 }
 
-/// What the densities of shapes may be.
+/// The range of the densities of shapes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sign {
     /// Each is 0 or more, and so is each shape.
@@ -89,7 +89,7 @@ pub(super) fn fit_mixture<R: AsRef<[f64]>>(
     fit_mixture_with(bands, bases, sign, &[], densities)
 }
 
-/// As [`fit_mixture`], from these densities on, with those of the terms `held` as they are.
+/// Fits like [`fit_mixture`], from these densities on, and keeps those of the terms `held`.
 pub(super) fn fit_mixture_with<R: AsRef<[f64]>>(
     bands: &[SpectralBand],
     bases: &[R],
@@ -162,11 +162,11 @@ pub(super) fn information<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], 
     NormalEquations::new(bands, bases, &[], densities).information
 }
 
-/// What the weighted least squares solve.
+/// The equations that the weighted least squares solve.
 struct NormalEquations {
     /// Fisher's information.
     information: DMatrix<f64>,
-    /// Of each term the sum of the bands, less the terms that are held, times its shape and their weight.
+    /// For each term: the sum of the bands, less the held terms, times its shape and their weight.
     pull: Vec<f64>,
 }
 
@@ -182,7 +182,7 @@ impl NormalEquations {
         of_terms(bands, bases, held, densities)
     }
 
-    /// Of up to `TERMS` terms, a number that the compiler knows: the sums then stay in registers.
+    /// For up to `TERMS` terms, a number that the compiler knows: the sums then stay in registers.
     fn of<const TERMS: usize, R: AsRef<[f64]>>(
         bands: &[SpectralBand],
         bases: &[R],
@@ -204,7 +204,7 @@ impl NormalEquations {
         Self { information, pull: pull[..terms].to_vec() }
     }
 
-    /// Of any number of terms: white noise that is correlated with many neighbours has one for each.
+    /// For any number of terms: white noise that is correlated with many neighbours has one for each.
     fn of_many<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], held: &[usize], densities: &[f64]) -> Self {
         let terms = densities.len();
         let (mut information, mut pull) = (DMatrix::zeros(terms, terms), vec![0.0; terms]);

@@ -95,7 +95,7 @@ fn intervals_hold_behind_the_filters_of_the_part() {
     }
 }
 
-/// Of means of eight samples and the averaged spectrum of the samples. Their spectrum has segments of 2,048 samples, 63 of which fit in a
+/// Means of eight samples and the averaged spectrum of the samples. Their spectrum has segments of 2,048 samples, 63 of which fit in a
 /// record; the share of 80 records in which an interval of 95 % holds has a standard deviation of 2.4 %, the root mean square of as many
 /// errors is known to 8 %.
 #[test]

@@ -10,7 +10,7 @@ pub(crate) struct RecordedChannel {
     pub taps: usize,
     /// Values of the part's clock from one sample to the next.
     pub decimation: f64,
-    /// Of a sample if the reader took the means of the noise over its sample periods, without a filter, counts.
+    /// Deviation of a sample if the reader took the means of the noise over its sample periods, without a filter, counts.
     pub deviation: f64,
     pub samples: usize,
     pub seed: u64,

@@ -26,7 +26,7 @@ pub struct IntegratedError {
     pub seconds: f64,
     /// By the model.
     pub predicted: f64,
-    /// Of the data; absent where the record is too short.
+    /// Measured in the data; absent if the record is too short.
     pub observed: Option<ObservedError>,
 }
 

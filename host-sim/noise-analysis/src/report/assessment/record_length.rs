@@ -1,4 +1,4 @@
-//! How long to record: the standard error of a coefficient by the length of the record.
+//! The length to record: the standard error of a coefficient by the length of the record.
 
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
@@ -65,7 +65,7 @@ pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> 
     Some(information.cholesky()?.inverse()[(position, position)].sqrt() / 2.0)
 }
 
-/// Whether a term is noise, with a density: not a sinusoid or a ramp.
+/// True if a term is noise, with a density: not a sinusoid or a ramp.
 fn has_density(term: &&FittedTerm) -> bool {
     !matches!(term.kind, NoiseTerm::Sinusoid(_) | NoiseTerm::RateRamp)
 }

@@ -6,7 +6,7 @@ use crate::spectra::nearest_multiple;
 
 /// Probability of chance below which lines are those of a comb.
 const BY_CHANCE: f64 = 0.01;
-/// By which part of the record's resolution lines that are a few resolutions apart move each other's frequency.
+/// Part of the record's resolution by which lines a few resolutions apart move each other's frequency.
 const SHIFT_OF_NEIGHBOURS: f64 = 0.1;
 
 /// The lines of one periodic signal, as positions in the list of frequencies, the fundamental first.

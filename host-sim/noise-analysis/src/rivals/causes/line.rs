@@ -31,7 +31,7 @@ impl Tooth {
 pub(super) struct Line {
     pub(super) channel: usize,
     pub(super) effect: Effect,
-    /// What shows it.
+    /// Its evidence.
     pub(super) evidence: LineEvidence,
     /// Hz, with its bounds.
     pub(super) frequency_hz: BoundedEstimate,
@@ -108,7 +108,7 @@ impl Frequency {
     }
 }
 
-/// How far two lines of one frequency may be apart: their joint error, half their widths, and the resolution of the record.
+/// Largest distance of two lines of one frequency: their joint error, half their widths, and the resolution of the record.
 fn reach(line: &Line, other: &Line, duration_s: f64) -> f64 {
     NORMAL_995 * line.error.hypot(other.error) + 0.5 * line.width.max(other.width) + 1.0 / duration_s
 }

@@ -200,7 +200,7 @@ fn a_line_whose_amplitude_changes_is_modulated() {
     let Effect::ModulatedLine(of) = &cause.shown[0].effect else { panic!("{:?}", cause.shown[0].effect) };
     let parameters = [of.frequency_hz.value, of.amplitude.value, of.depth.value, of.period_s.value];
     assert!(parameters.iter().zip([12.0, 1.0, 0.5, 20.0]).all(|(found, of)| (found - of).abs() < 1e-9), "{of:?}");
-    // Of a line that is on for half of the time the third multiples have a third of the first.
+    // A line that is on for half of the time has third multiples of a third of the first.
     let further = [11.85, 12.15].map(|frequency| steady(frequency, 0.25 / 3.0));
     let switched: Vec<Effect> = modulated.iter().cloned().chain(further).collect();
     assert_eq!(causes(std::slice::from_ref(&switched)), [("modulated_line", vec![0])]);

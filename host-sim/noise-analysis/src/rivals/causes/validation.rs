@@ -1,4 +1,4 @@
-//! Whether the second half of a record agrees with what the first half shows.
+//! Test of the first half's findings on the second half of a record.
 //!
 //! The first half is analysed by itself, as if there were nothing else. If an effect holds throughout, its parameters in the
 //! first half and in the whole record are two estimates of the same numbers, the second of which uses all the samples of
@@ -17,7 +17,7 @@ const LEVEL: f64 = 0.01;
 /// Farthest that the lines of two halves may be apart, as a part of their frequency, to be taken for the same line.
 const FARTHEST_LINE: f64 = 0.1;
 
-/// Whether an effect of the first half may be the same as one of the whole record.
+/// True if an effect of the first half may be the same as one of the whole record.
 pub(super) fn is_same(whole: &Effect, half: &Effect) -> bool {
     match (whole.is_line(), half.is_line()) {
         (true, true) => distance(whole, half) < FARTHEST_LINE,
@@ -25,7 +25,7 @@ pub(super) fn is_same(whole: &Effect, half: &Effect) -> bool {
     }
 }
 
-/// How far the frequencies of two effects are apart, as a part of the first; 0 of effects without a frequency.
+/// Distance of the frequencies of two effects, as a part of the first; 0 for effects without a frequency.
 pub(super) fn distance(whole: &Effect, half: &Effect) -> f64 {
     match (whole.frequency_hz(), half.frequency_hz()) {
         (Some(whole), Some(half)) if whole.value > 0.0 => (half.value / whole.value - 1.0).abs(),
@@ -43,7 +43,7 @@ pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
         })
         .collect();
     let Some(largest) = deviations.iter().copied().reduce(f64::max) else { return Validation::Untestable };
-    // Of this many deviations the largest, had they been independent (Šidák).
+    // The largest of this many deviations, as if they were independent (Šidák).
     let p_value = 1.0 - (1.0 - 2.0 * upper_tail(largest)).powi(i32::try_from(deviations.len()).unwrap_or(i32::MAX));
     if p_value < LEVEL { Validation::No } else { Validation::Yes }
 }

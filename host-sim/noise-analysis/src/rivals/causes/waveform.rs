@@ -45,12 +45,12 @@ fn amplitude_of(lines: &[(Tooth, Line)], number: u32) -> Option<ChannelEstimate>
     Some(harmonic(lines, number)?.amplitude)
 }
 
-/// Whether two amplitudes of about this `size` are equal within [`SQUARE_TOLERANCE`] and their errors.
+/// True if two amplitudes of about this `size` are equal within [`SQUARE_TOLERANCE`] and their errors.
 pub(super) fn is_equal(one: ChannelEstimate, other: ChannelEstimate, size: f64) -> bool {
     (one.value - other.value).abs() < SQUARE_TOLERANCE * size + SQUARE_SIGMAS * one.error().hypot(other.error())
 }
 
-/// Whether the lines of a channel have the amplitudes of a square wave: 1/k at the odd multiples k, the first and the third
+/// True if the lines of a channel have the amplitudes of a square wave: 1/k at the odd multiples k, the first and the third
 /// among them, and none at even ones that a wave with two unequal halves would have to show.
 pub(super) fn is_square(lines: &[(Tooth, Line)]) -> bool {
     let (Some(first), Some(_)) = (amplitude_of(lines, 1), amplitude_of(lines, 3)) else { return false };
@@ -65,7 +65,7 @@ pub(super) fn is_square(lines: &[(Tooth, Line)]) -> bool {
     lines.iter().all(has_size)
 }
 
-/// Whether the lines of a channel are those of a signal that is the same every period and no sinusoid: a steady fundamental, its second
+/// True if the lines of a channel are those of a signal that is the same every period and no sinusoid: a steady fundamental, its second
 /// and its third harmonic, and higher harmonics with at least the part [`NO_SINUSOID`] of its deviation.
 pub(super) fn is_no_sinusoid(lines: &[(Tooth, Line)]) -> bool {
     let Some(fundamental) = harmonic(lines, 1).filter(|of| matches!(of.effect, Effect::SinusoidalLine(_))) else {
@@ -164,7 +164,7 @@ pub(super) fn periodic(lines: &[(Tooth, Line)]) -> Effect {
     }
 }
 
-/// What these lines are to the fundamental.
+/// The multiples of the fundamental that these lines are.
 fn multiples(lines: &[(Tooth, Line)]) -> Multiples {
     let harmonics: Vec<u32> = lines.iter().filter_map(|(tooth, _)| tooth.multiple()).collect();
     Multiples { sidebands: lines.len() - harmonics.len(), harmonics }

@@ -8,7 +8,7 @@ use crate::spectra::SpectralLine;
 use crate::spectra::spectral_lines::{MergedLine, merged};
 use allan_core::term::{Markov, Resonance, Sinusoid};
 
-/// What claims one variance, in a case that one row decides.
+/// Claims to one variance, in a case that one row decides.
 enum Claims {
     Line { line: MergedLine, faster: Vec<MergedLine>, left: Option<Vec<MergedLine>>, gain: f64 },
     Spectrum(Box<SpectrumProposals>),
@@ -411,7 +411,7 @@ fn each_row_decides_its_case() {
     }
 }
 
-/// What is just beyond the condition of a row stands beside its rival.
+/// A claim just beyond the condition of a row stands beside its rival.
 #[test]
 fn rows_do_not_reach_beyond_their_conditions() {
     let all: Vec<&Rivalry> = RIVALRIES.iter().collect();
