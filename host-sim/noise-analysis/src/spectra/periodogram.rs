@@ -103,6 +103,16 @@ pub(super) fn taper(at: usize, length: usize) -> f64 {
     if from_end < rise { (1.0 - (PI * from_end / rise).cos()) / 2.0 } else { 1.0 }
 }
 
+/// Power of a sinusoid under the taper at a distance in resolutions, over that at its frequency. The taper is a rectangle convolved with half
+/// a period of a cosine.
+pub(super) fn taper_response(distance: f64) -> f64 {
+    let sinc = |of: f64| if of.abs() < 1e-6 { 1.0 } else { of.sin() / of };
+    // cos(πx)/(1 − 4x²), whose limit at x = ½ is π/4.
+    let (x, edge) = (RISE * distance, 0.5 - (RISE * distance).abs());
+    let cosine = if edge.abs() < 1e-6 { PI / 4.0 } else { (PI * x).cos() / (1.0 - 4.0 * x * x) };
+    (sinc(PI * (1.0 - RISE) * distance) * cosine).powi(2)
+}
+
 /// Largest length up to `length` without a prime factor above 7.
 pub(super) fn smooth_length(length: usize) -> usize {
     (1..=length).rev().find(|&candidate| is_smooth(candidate)).unwrap_or(0)

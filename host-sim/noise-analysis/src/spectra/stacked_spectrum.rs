@@ -230,4 +230,17 @@ mod tests {
         within(line.deviation, deviation);
         within(measured, width);
     }
+
+    /// A strong sinusoid has skirts that stand out of the mean spectrum.
+    #[test]
+    fn a_strong_sinusoid_is_one_line() {
+        for (seed, amplitude) in [(1, 0.35), (2, 1.0), (3, 10.0)] {
+            for frequency in [20.3, 23.4567] {
+                let found = lines(seed, |time_s| amplitude * (TAU * frequency * time_s).sin());
+                let [line] = found[..] else { panic!("{amplitude} {frequency}: {found:?}") };
+                assert_eq!(line.width, None, "{amplitude} {frequency}");
+                assert!((line.frequency.value - frequency).abs() < 4.0 * line.frequency.error, "{line:?}");
+            }
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use super::found_sine::FoundSine;
 use super::line_envelope::Modulation;
 use super::line_models::{Lorentz, Sine};
-use super::periodogram::{PADDING, Periodogram};
+use super::periodogram::{PADDING, Periodogram, taper_response};
 use super::smooth_shape::{Background, Filters, LocalLevel, WINDOW};
 use super::spectral_line::{Resonance, SpectralLine};
 use crate::bounds::MeasuredValue;
@@ -317,13 +317,16 @@ impl<'a> WhitenedSpectrum<'a> {
         let padded = self.padded();
         let last = padded.len() - PADDING - 1;
         let position = |bin: f64| (bin * PADDING as f64).clamp(1.0, last as f64 - 1.0) as usize;
-        let near = position(bin - width)..=position(bin + width);
-        let highest = near.max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
-        let level = self.background.level(self.whitened(), highest / PADDING).value;
+        let level = self.background.level(self.whitened(), bin as usize).value;
+        let exceeds = |at: &usize| padded[*at] > level * (1.0 + EXCEEDS / self.independent.sqrt());
+        // The skirts of a strong line are found before its peak.
+        let (low, high) = (position(bin - width), position(bin + width));
+        let low = (1..low).rev().take(MOST_REACHED).take_while(exceeds).last().unwrap_or(low);
+        let high = (high + 1..last).take(MOST_REACHED).take_while(exceeds).last().unwrap_or(high);
+        let highest = (low..=high).max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
         // ln of a taper's main lobe is nearly a parabola.
         let shift = summit([highest - 1, highest, highest + 1].map(|at| padded[at].ln())).clamp(-0.5, 0.5);
         let centre = (highest as f64 + shift) / PADDING as f64;
-        let exceeds = |at: &usize| padded[*at] > level * (1.0 + EXCEEDS / self.independent.sqrt());
         let below = (1..highest).rev().take(MOST_REACHED).take_while(exceeds).count().max(PADDING).min(highest - 1);
         let above = (highest + 1..last).take(MOST_REACHED).take_while(exceeds).count().max(PADDING);
         let reached = highest - below..=(highest + above).min(last);
@@ -353,7 +356,15 @@ impl<'a> WhitenedSpectrum<'a> {
             shape_p_value: 1.0,
             modulation: None,
         };
-        let replaced = reached.map(|at| (at, without(at) / self.deflation_at(at))).collect();
+        // The skirts of a strong line would be a band.
+        let height = (peak - 1.0) / taper_response(shift / PADDING as f64);
+        let skirt = |at: usize| 1.0 + height * taper_response(at as f64 / PADDING as f64 - centre);
+        let replaced = |at: usize| match reached.contains(&at) {
+            true => without(at) / self.deflation_at(at),
+            false => self.periodogram.padded()[at] / skirt(at),
+        };
+        let near = highest.saturating_sub(MOST_REACHED).max(1)..=(highest + MOST_REACHED).min(last);
+        let replaced = near.map(|at| (at, replaced(at))).collect();
         (line, replaced)
     }
 
