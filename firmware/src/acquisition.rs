@@ -87,13 +87,11 @@ impl<'q> Sampler<'q> {
     }
 
     /// True if a burst is being transferred.
-    #[must_use]
     pub fn is_reading(&self) -> bool {
         self.reading.is_some()
     }
 
     /// Transfers so far.
-    #[must_use]
     pub fn activity(&self) -> SamplingActivity {
         self.activity
     }
@@ -133,15 +131,6 @@ impl<'q> Sampler<'q> {
     }
 }
 
-/// Relation of a data-ready edge to the ones before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DrdyEdge {
-    /// Number of sample periods since the edge before; 1 if no edge was lost, and for the first edge.
-    Periods(u32),
-    /// The edge is spurious: not at a multiple of the sample period.
-    Spurious,
-}
-
 /// Monitors the data-ready edges of a sensor with one programmed sample period.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DataReadyMonitor {
@@ -161,30 +150,30 @@ pub struct DataReadyMonitor {
 
 impl DataReadyMonitor {
     /// A monitor for edges at multiples of `period`, each within a quarter of it.
-    #[must_use]
     pub fn new(period: SamplePeriod) -> Self {
         Self { period_q8: u64::from(period.ticks()) * TICK_Q8, ..Self::default() }
     }
 
-    /// Takes the time of an edge in microseconds; times must not decrease.
-    pub fn edge(&mut self, at_us: u64) -> DrdyEdge {
+    /// Takes the time of an edge in microseconds; times must not decrease. Returns the sample periods since the edge
+    /// before, 1 if no edge was lost, and for the first edge; `None` if the edge is at no multiple of the period.
+    pub fn edge(&mut self, at_us: u64) -> Option<u32> {
         self.silent |= self.is_silent_at(at_us);
         let Some(last_us) = self.last_us else {
             self.last_us = Some(at_us);
-            return DrdyEdge::Periods(1);
+            return Some(1);
         };
         let interval_us = at_us.saturating_sub(last_us);
         let (interval, period) = (interval_us << 8, self.mean_period_q8());
         // A period of 0 means damaged memory: the main loop restarts the device.
-        let Some(periods) = (interval + period / 2).checked_div(period) else { return DrdyEdge::Spurious };
+        let periods = (interval + period / 2).checked_div(period)?;
         let deviation = interval.abs_diff(periods * period);
         if core::mem::take(&mut self.new_phase) {
             self.last_us = Some(at_us);
-            return DrdyEdge::Periods(u32::try_from(periods.max(1)).unwrap_or(u32::MAX));
+            return Some(u32::try_from(periods.max(1)).unwrap_or(u32::MAX));
         }
         if periods == 0 || deviation > period / 4 {
             self.suspicion = (self.suspicion + 3).min(2 * SUSPECT);
-            return DrdyEdge::Spurious;
+            return None;
         }
         self.last_us = Some(at_us);
         if periods <= SILENT_PERIODS {
@@ -193,7 +182,7 @@ impl DataReadyMonitor {
         }
         self.suspicion =
             if periods == 1 { self.suspicion.saturating_sub(1) } else { (self.suspicion + 2).min(2 * SUSPECT) };
-        DrdyEdge::Periods(u32::try_from(periods).unwrap_or(u32::MAX))
+        Some(u32::try_from(periods).unwrap_or(u32::MAX))
     }
 
     /// True if the sensor must be probed before its samples are used: after a silence, or at another edge rate.
@@ -203,13 +192,11 @@ impl DataReadyMonitor {
     }
 
     /// Time of the latest edge at a multiple of the period, µs; `None` before the first.
-    #[must_use]
     pub fn last_edge_us(&self) -> Option<u64> {
         self.last_us
     }
 
     /// True if no edge has come for so long that the sensor may be disconnected or reset.
-    #[must_use]
     pub fn is_silent_at(&self, now_us: u64) -> bool {
         let last_sign_us = self.last_us.unwrap_or(0).max(self.probed_us);
         now_us.saturating_sub(last_sign_us) > self.silence_us()
@@ -229,7 +216,6 @@ impl DataReadyMonitor {
     }
 
     /// Mean sample rate in Hz; `None` before 64 periods. The error is below 10⁻⁴ at 819.2 Hz, and falls with time.
-    #[must_use]
     pub fn measured_hz(&self) -> Option<f64> {
         (self.periods >= SETTLED_PERIODS).then(|| self.periods as f64 * 1e6 / self.elapsed_us as f64)
     }
@@ -268,9 +254,9 @@ mod tests {
         let [mut single, mut lost, mut spurious] = [0; 3];
         for periods in at {
             match monitor.edge((periods * PERIOD_US * fast) as u64) {
-                DrdyEdge::Periods(1) => single += 1,
-                DrdyEdge::Periods(n) => lost += n - 1,
-                DrdyEdge::Spurious => spurious += 1,
+                Some(1) => single += 1,
+                Some(n) => lost += n - 1,
+                None => spurious += 1,
             }
         }
         [single, lost, spurious]

@@ -20,8 +20,7 @@ use crate::status_flags::StatusFlags;
 use crate::stored_state::{self, StoredSettings};
 use crate::watchdog::TaskMonitor;
 use adis16405_driver::{Config, ConfigError, SamplePeriod};
-use core::fmt::Arguments;
-use link::{Boot, BootCause, Health, MessageRef, text_line};
+use link::{Boot, BootCause, Health, MessageRef, TextLine, text};
 
 /// The start-up data of a board for the application.
 pub struct Start {
@@ -167,13 +166,16 @@ impl App {
         }
         board.feed_watchdog();
         while let Some((port, byte)) = board.receive() {
-            match self.parsers[port as usize].push(byte) {
+            let answer = match self.parsers[port as usize].push(byte) {
                 Some(Ok(command)) => {
                     event!(debug, "command {}", command);
-                    self.execute(command, board);
+                    self.execute(command, board)
                 }
-                Some(Err(error)) => self.reject(error, board),
-                None => {}
+                Some(Err(error)) => Some(self.reject(error)),
+                None => None,
+            };
+            if let Some(line) = answer {
+                self.console.print(board, line);
             }
         }
         if self.state.supervise_sensor(board) {
@@ -201,90 +203,84 @@ impl App {
         has_room
     }
 
-    fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
-        self.console.print(board, text);
-    }
-
-    fn execute(&mut self, command: Command, board: &mut impl Board) {
-        let now_us = board.now_us();
-        let (range, taps, period) =
-            (self.state.config.range(), self.state.config.filter_taps_log2(), self.state.config.sample_period());
-        match command {
-            Command::Answer(answer) => self.console.answer(board, answer),
-            Command::Version => self.print(board, format_args!("{VERSION_LINE}")),
-            Command::Report => self.report.start(),
+    /// Executes a command; the answer of one line, if it has one. Not inlined: its lines would add to the stack of a fit.
+    #[inline(never)]
+    fn execute(&mut self, command: Command, board: &mut impl Board) -> Option<TextLine> {
+        let (now_us, config) = (board.now_us(), self.state.config);
+        let (range, taps, period) = (config.range(), config.filter_taps_log2(), config.sample_period());
+        Some(match command {
+            Command::Answer(answer) => return self.console.answer(answer),
+            Command::Version => text!("{VERSION_LINE}"),
+            Command::Report => {
+                self.report.start();
+                return None;
+            }
             Command::ResetStatistics => {
                 self.reset_statistics(board);
                 self.state.counters = Health::default();
                 self.state.status_flags = StatusFlags::default();
-                self.print(board, format_args!("statistics reset"));
+                text!("statistics reset")
             }
-            Command::Rate(millihertz) => match SamplePeriod::nearest(f64::from(millihertz) / 1000.0) {
-                Ok(period) => self.configure(board, Config::new(range, taps, period)),
-                Err(error) => self.print(board, format_args!("{error}")),
-            },
+            Command::Rate(millihertz) => {
+                let period = SamplePeriod::nearest(f64::from(millihertz) / 1000.0);
+                self.configure(board, period.and_then(|period| Config::new(range, taps, period)))
+            }
             Command::Range(range) => {
-                self.configure(board, Config::new(range, taps.max(range.min_filter_taps_log2()), period));
+                self.configure(board, Config::new(range, taps.max(range.min_filter_taps_log2()), period))
             }
             Command::Filter(taps) => self.configure(board, Config::new(range, taps, period)),
             Command::Epoch(seconds) => {
                 self.state.settings.user.epoch_s = seconds;
                 self.retained.write_settings(self.state.settings, false);
-                let age_s = self.state.epoch_age_s(now_us);
-                self.print(board, format_args!("epoch of {seconds} s; this one began {age_s} s ago"));
+                text!("epoch of {seconds} s; this one began {} s ago", self.state.epoch_age_s(now_us))
             }
             Command::Interval(seconds) => {
                 self.state.settings.user.interval_s = seconds;
                 self.next_report_us = now_us + interval_us(self.state.settings);
                 self.retained.write_settings(self.state.settings, false);
-                self.print(board, format_args!("reports every {seconds} s"));
+                text!("reports every {seconds} s")
             }
             Command::RawStream(on) => {
                 board.estimators(|estimators| estimators.set_raw_stream(on));
-                self.print(board, format_args!("stream of raw bursts {}", if on { "on" } else { "off" }));
+                text!("stream of raw bursts {}", if on { "on" } else { "off" })
             }
-            Command::SelfTest => self.state.request_check(now_us, board),
+            Command::SelfTest => {
+                self.state.request_check(now_us, board);
+                return None;
+            }
             Command::ProductId(prod_id) => {
                 self.state.settings.user.prod_id = prod_id;
                 self.retained.write_settings(self.state.settings, false);
-                match prod_id {
-                    0 => self.print(board, format_args!("parts with the PROD_ID of their type")),
-                    _ => self.print(board, format_args!("a part that answers PROD_ID {prod_id} is an ADIS16405")),
-                }
                 self.state.request_check(now_us, board);
-            }
-            Command::BrownOut => match board.program_brown_out() {
-                BrownOutLevel::Fixed => self.print(board, format_args!("this board sets its brown-out level itself")),
-                BrownOutLevel::Set => self.print(board, format_args!("brown-out: 2.7 V, as before")),
-                BrownOutLevel::Programmed => {
-                    log(board, format_args!("option bytes written: brown-out level 2.7 V, after the supply was off"));
+                match prod_id {
+                    0 => text!("parts with the PROD_ID of their type"),
+                    _ => text!("a part that answers PROD_ID {prod_id} is an ADIS16405"),
                 }
-                BrownOutLevel::Failed => log(board, format_args!("option bytes not written")),
-            },
+            }
+            Command::BrownOut => {
+                let level = match board.program_brown_out() {
+                    BrownOutLevel::Fixed => return Some(text!("this board sets its brown-out level itself")),
+                    BrownOutLevel::Set => return Some(text!("brown-out: 2.7 V, as before")),
+                    BrownOutLevel::Programmed => "written: brown-out level 2.7 V, after the supply was off",
+                    BrownOutLevel::Failed => "not written",
+                };
+                log(board, format_args!("option bytes {level}"));
+                return None;
+            }
             Command::Arm => {
                 self.armed_until_us = now_us + ARMED_US;
-                self.print(board, format_args!("keep the sensor still; autonull within 10 s nulls its bias"));
+                text!("keep the sensor still; autonull within 10 s nulls its bias")
             }
             Command::AutoNull => self.auto_null(board, now_us),
-            Command::ReadRegister(register) => {
-                let line = bench_console::read_register(register, &self.state, board);
-                self.print(board, format_args!("{line}"));
-            }
-            Command::CompareReads(register) => {
-                let line = bench_console::compare_reads(register, &self.state, board);
-                self.print(board, format_args!("{line}"));
-            }
+            Command::ReadRegister(register) => bench_console::read_register(register, &self.state, board),
+            Command::CompareReads(register) => bench_console::compare_reads(register, &self.state, board),
             Command::WriteRegister(register, value)
                 if bench_console::writes_flash(register, value) && !self.disarm(now_us) =>
             {
-                self.print(
-                    board,
-                    format_args!("not armed: this writes the sensor's flash; arm, then poke within 10 s"),
-                );
+                text!("not armed: this writes the sensor's flash; arm, then poke within 10 s")
             }
             Command::WriteRegister(register, value) => {
-                let line = bench_console::write_register(register, value, &self.state, board);
-                self.print(board, format_args!("{line}"));
+                bench_console::write_register(register, value, &self.state, board)
             }
             Command::SlowBus(is_slow) => {
                 board.set_sampling(false);
@@ -292,27 +288,20 @@ impl App {
                 self.state.request_probe(now_us);
                 let timing =
                     if is_slow { "slow timing of the bus, until a restart" } else { "usual timing of the bus" };
-                self.print(board, format_args!("{timing}"));
+                text!("{timing}")
             }
-            Command::Persist => {
-                let written = self.persist(board);
-                self.tell_written(written, "settings and models are kept without power", board);
+            Command::Persist => written(self.persist(board), "settings and models are kept without power"),
+            Command::Forget => written(self.write_record(&[], board), "nothing is kept without power"),
+            Command::Restart => {
+                self.restart(board);
+                return None;
             }
-            Command::Forget => {
-                let erased = self.write_record(&[], board);
-                self.tell_written(erased, "nothing is kept without power", board);
-            }
-            Command::Restart => self.restart(board),
             Command::BootLoader => {
                 self.checkpoint_all(board);
-                if !board.start_boot_loader() {
-                    self.print(
-                        board,
-                        format_args!("no boot loader that a command starts: use the board's button or pin"),
-                    );
-                }
+                return (!board.start_boot_loader())
+                    .then(|| text!("no boot loader that a command starts: use the board's button or pin"));
             }
-        }
+        })
     }
 
     fn restart(&mut self, board: &mut impl Board) {
@@ -325,31 +314,25 @@ impl App {
         self.checkpoint_age(board.now_us());
     }
 
-    fn reject(&mut self, error: CommandError, board: &mut impl Board) {
+    fn reject(&mut self, error: CommandError) -> TextLine {
         add(&mut self.state.counters.bad_commands, 1);
         match error {
             CommandError::UnknownKey(byte) => {
-                let key = char::from(byte).escape_default();
-                self.print(board, format_args!("{key} is no command; ? lists them"));
+                text!("{} is no command; ? lists them", char::from(byte).escape_default())
             }
-            CommandError::LostBytes => self.print(board, format_args!("bytes were lost: repeat the command")),
-            CommandError::InvalidLine(letter) => {
-                self.print(board, format_args!("no such {} command; ? lists them", char::from(letter)));
-            }
+            CommandError::LostBytes => text!("bytes were lost: repeat the command"),
+            CommandError::InvalidLine(letter) => text!("no such {} command; ? lists them", char::from(letter)),
         }
     }
 
-    fn configure(&mut self, board: &mut impl Board, config: Result<Config, ConfigError>) {
+    fn configure(&mut self, board: &mut impl Board, config: Result<Config, ConfigError>) -> TextLine {
         let config = match config {
             Ok(config) => config,
-            Err(error) => return self.print(board, format_args!("{error}")),
+            Err(error) => return text!("{error}"),
         };
         if let Err(clock_hz) = self.state.prepare_clock(config, board) {
             let limit_hz = LOW_POWER_LIMIT_HZ;
-            return self.print(
-                board,
-                format_args!("below 182 SPS the sensor takes a serial clock of {limit_hz} Hz, not {clock_hz} Hz"),
-            );
+            return text!("below 182 SPS the sensor takes a serial clock of {limit_hz} Hz, not {clock_hz} Hz");
         }
         self.state.config = config;
         self.state.settings.user.smpl_prd = config.sample_period().register();
@@ -357,7 +340,7 @@ impl App {
         self.reset_statistics(board);
         board.estimators(|estimators| estimators.restart(config));
         self.state.request_probe(board.now_us());
-        self.print(board, format_args!("statistics reset: the sensor is configured anew"));
+        text!("statistics reset: the sensor is configured anew")
     }
 
     /// Returns whether a flash write was armed; the next one must be armed again.
@@ -365,29 +348,22 @@ impl App {
         now_us < core::mem::take(&mut self.armed_until_us)
     }
 
-    fn auto_null(&mut self, board: &mut impl Board, now_us: u64) {
+    fn auto_null(&mut self, board: &mut impl Board, now_us: u64) -> TextLine {
         if !self.disarm(now_us) {
-            return self.print(board, format_args!("not armed: arm first, then autonull within 10 s"));
+            return text!("not armed: arm first, then autonull within 10 s");
         }
         board.set_sampling(false);
         self.state.request_probe(now_us);
         let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-        let done = auto_null(board.sensor_bus(), self.state.config, sck_hz)
-            .map_err(|error| text_line(format_args!("{error}")));
-        match done {
-            Ok(bias) => {
-                self.reset_statistics(board);
-                match bias.host_x {
-                    0 => self.print(board, format_args!("bias nulled, statistics reset")),
-                    // The driver keeps a negative x, since bursts lose its sign (erratum). The Allan variance does not
-                    // depend on it.
-                    x => self.print(
-                        board,
-                        format_args!("bias of y and z nulled, statistics reset; x: {x} counts not applied by the part"),
-                    ),
-                }
-            }
-            Err(error) => self.print(board, format_args!("bias not nulled: {error}")),
+        let done = auto_null(board.sensor_bus(), self.state.config, sck_hz).map_err(|error| text!("{error}"));
+        if done.is_ok() {
+            self.reset_statistics(board);
+        }
+        match done.map(|bias| bias.host_x) {
+            Ok(0) => text!("bias nulled, statistics reset"),
+            // The driver keeps a negative x, since bursts lose its sign (erratum). The Allan variance does not depend on it.
+            Ok(x) => text!("bias of y and z nulled, statistics reset; x: {x} counts not applied by the part"),
+            Err(error) => text!("bias not nulled: {error}"),
         }
     }
 
@@ -426,13 +402,6 @@ impl App {
         let pause_us = board.now_us() - began_us;
         self.state.resume_sampling(board);
         written.map(|()| pause_us)
-    }
-
-    fn tell_written(&mut self, written: Result<u64, StoreError>, done: &str, board: &mut impl Board) {
-        match written {
-            Ok(us) => self.print(board, format_args!("{done}; not sampled for {} ms", us.div_ceil(1000))),
-            Err(error) => self.print(board, format_args!("not written: {error}")),
-        }
     }
 
     /// Writes one channel per [`CHECKPOINT_US`], and the epoch's age after the last: each once in 0.8 s, or at once
@@ -543,7 +512,7 @@ impl App {
         let mut fit = EpochFit::new(regressors);
         if fit.run(channel, &mut || self.service_during_fit(board)) {
             self.state.learner.learn(&fit, channel.epoch, channel.index);
-            send_learned(board, &fit, channel.index, channel.epoch.number);
+            send(board, MessageRef::Learned(&fit.message(channel.index, channel.epoch.number)));
         }
     }
 
@@ -566,7 +535,10 @@ fn read_stored(board: &mut impl Board, learner: &mut Learner) -> Option<StoredSe
     stored_state::decode_models(models, &mut learner.models).then_some(settings)
 }
 
-fn send_learned(board: &mut impl Board, fit: &EpochFit, index: usize, epoch: u32) {
-    let message = fit.message(index, epoch);
-    send(board, MessageRef::Learned(&message));
+/// The answer to a request to write the record.
+fn written(result: Result<u64, StoreError>, done: &str) -> TextLine {
+    match result {
+        Ok(us) => text!("{done}; not sampled for {} ms", us.div_ceil(1000)),
+        Err(error) => text!("not written: {error}"),
+    }
 }

@@ -8,7 +8,7 @@ use crate::sensor::{LOW_POWER_LIMIT_HZ, addressed};
 use adis16405_driver::{Access, Adis16405, BURST_BYTES, Config, Error, Register, Stimulus, Timing};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
-use link::{TextLine, text_line};
+use link::{TextLine, text};
 
 /// The register with this name, or with this address in hexadecimal: `smpl_prd`, `36`, `0x36`.
 pub(crate) fn register(name: &str) -> Option<Register> {
@@ -67,40 +67,38 @@ fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<
             Request::Write(register, value) => sensor.write_register(register, value).map(|()| [0; 6]),
             Request::Deflections(stimulus) => sensor.stimulus_response(stimulus),
             Request::Compare(register) => {
-                sensor = sensor.with_timing(Timing::DEFAULT).with_sck_hz(sck_hz);
-                compared(register, &mut sensor)
+                compared(register, &mut sensor.with_timing(Timing::DEFAULT).with_sck_hz(sck_hz))
             }
         };
-        answer.map_err(|error| text_line(format_args!("{error}")))
+        answer.map_err(|error| text!("{error}"))
     };
     board.set_clock_limit(clock_limit_hz(state.config));
     state.resume_sampling(board);
     answer
 }
 
-fn line(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
-    let (name, address) = (register.name(), register.address());
-    match ask(Request::Read(register), state, board) {
-        Ok([value, ..]) => text_line(format_args!("{name:<10} {address:#04x}  {:#06x}  {value}", value as u16)),
-        Err(error) => text_line(format_args!("{name:<10} {address:#04x}  {error}")),
-    }
-}
-
+/// The line of a register that was read, also one of the dump.
+#[inline(never)]
 pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
+    let (name, address) = (register.name(), register.address());
     if register.access() == Access::Write {
-        return text_line(format_args!("{} cannot be read", register.name()));
+        return text!("{name} cannot be read");
     }
-    line(register, state, board)
+    match ask(Request::Read(register), state, board) {
+        Ok([value, ..]) => text!("{name:<10} {address:#04x}  {:#06x}  {value}", value as u16),
+        Err(error) => text!("{name:<10} {address:#04x}  {error}"),
+    }
 }
 
 pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
     let (name, address) = (register.name(), register.address());
     match ask(Request::Compare(register), state, board) {
-        Ok([first, others, bits, ..]) => text_line(format_args!(
+        Ok([first, others, bits, ..]) => text!(
             "{name:<10} {address:#04x}  {:#06x}  {others} of {COMPARED_READS} differ, bits {:#06x}",
-            first as u16, bits as u16
-        )),
-        Err(error) => text_line(format_args!("{name:<10} {address:#04x}  {error}")),
+            first as u16,
+            bits as u16
+        ),
+        Err(error) => text!("{name:<10} {address:#04x}  {error}"),
     }
 }
 
@@ -114,12 +112,13 @@ pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
 
 /// Writes a register and reads it back if possible; `check` restores the device's own settings.
 pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {
+    let name = register.name();
     match register.access() {
-        Access::Read => text_line(format_args!("{} cannot be written", register.name())),
+        Access::Read => text!("{name} cannot be written"),
         access => match ask(Request::Write(register, value), state, board) {
-            Ok(_) if access == Access::Write => text_line(format_args!("{} written", register.name())),
-            Ok(_) => line(register, state, board),
-            Err(error) => text_line(format_args!("{}: {error}", register.name())),
+            Ok(_) if access == Access::Write => text!("{name} written"),
+            Ok(_) => read_register(register, state, board),
+            Err(error) => text!("{name}: {error}"),
         },
     }
 }
@@ -144,33 +143,28 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
             let burst_us = board.frame_times().low_us;
             let bits = 8 * BURST_BYTES as u32;
             match (state.is_sampled(), burst_us) {
-                (true, 1..) => text_line(format_args!(
+                (true, 1..) => text!(
                     "SCK: {} Hz set; the last burst of {bits} bits took {burst_us} us: {} Hz with its gaps",
                     state.spi_clock_hz,
                     hz(f64::from(bits) * 1e6 / f64::from(burst_us))
-                )),
-                _ => text_line(format_args!("SCK: {} Hz set; no burst to measure", state.spi_clock_hz)),
+                ),
+                _ => text!("SCK: {} Hz set; no burst to measure", state.spi_clock_hz),
             }
         }
         1 => match register_frames(state, board) {
-            Ok(FrameTimes { shortest_high_us, shortest_period_us, .. }) => text_line(format_args!(
+            Ok(FrameTimes { shortest_high_us, shortest_period_us, .. }) => text!(
                 "stall: CS high for {shortest_high_us} us or more; read rate: {shortest_period_us} us or more a frame"
-            )),
-            Err(error) => text_line(format_args!("stall: {error}")),
+            ),
+            Err(error) => text!("stall: {error}"),
         },
         2 => {
-            let measured = board.estimators(|estimators| estimators.measured_hz());
-            let programmed_hz = state.config.sample_period().hz();
-            match measured {
+            let programmed = hz(state.config.sample_period().hz());
+            match board.estimators(|estimators| estimators.measured_hz()) {
                 Some(measured) => {
                     let period_us = Decimal::significant(1e6 / measured, 6);
-                    text_line(format_args!(
-                        "DRDY: {} Hz, period {period_us} us, {} Hz set",
-                        hz(measured),
-                        hz(programmed_hz)
-                    ))
+                    text!("DRDY: {} Hz, period {period_us} us, {programmed} Hz set", hz(measured))
                 }
-                None => text_line(format_args!("DRDY: fewer than 64 edges; {} Hz set", hz(programmed_hz))),
+                None => text!("DRDY: fewer than 64 edges; {programmed} Hz set"),
             }
         }
         3 => {
@@ -179,8 +173,8 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
             let width = board.data_ready_width_us(limit_us);
             state.resume_sampling(board);
             match width {
-                Some(us) => text_line(format_args!("DRDY: high for {us} us, within some us")),
-                None => text_line(format_args!("DRDY: no pulse in {} ms", limit_us / 1000)),
+                Some(us) => text!("DRDY: high for {us} us, within some us"),
+                None => text!("DRDY: no pulse in {} ms", limit_us / 1000),
             }
         }
         _ => return AnswerLine::End,
@@ -197,11 +191,7 @@ fn register_frames(state: &DeviceState, board: &mut impl Board) -> Result<FrameT
 /// Deflections of gyros x, y, z and accelerometers x, y, z, counts.
 pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     let (sign, stimulus) = match index {
-        0 => {
-            return AnswerLine::Text(text_line(format_args!(
-                "deflections in counts: gyros x y z, accelerometers x y z"
-            )));
-        }
+        0 => return AnswerLine::Text(text!("deflections in counts: gyros x y z, accelerometers x y z")),
         1 => ("positive", Stimulus::Positive),
         2 => ("negative", Stimulus::Negative),
         _ => return AnswerLine::End,
@@ -209,17 +199,15 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
     let test_s = deflection_s(state.config);
     if test_s > LONGEST_TEST_S {
         let test_s = Decimal::significant(test_s, 2);
-        return AnswerLine::Text(text_line(format_args!(
-            "{sign} not run, it takes {test_s} s: another rate or filter"
-        )));
+        return AnswerLine::Text(text!("{sign} not run, it takes {test_s} s: another rate or filter"));
     }
     let response = ask(Request::Deflections(stimulus), state, board);
     // The filter still contains samples of the deflected sensor.
     let now_us = board.now_us();
     board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
     AnswerLine::Text(match response {
-        Ok([a, b, c, d, e, f]) => text_line(format_args!("{sign} {a} {b} {c}  {d} {e} {f}")),
-        Err(error) => text_line(format_args!("{sign} {error}")),
+        Ok([a, b, c, d, e, f]) => text!("{sign} {a} {b} {c}  {d} {e} {f}"),
+        Err(error) => text!("{sign} {error}"),
     })
 }
 

@@ -65,21 +65,12 @@ impl FrameTimes {
 
 /// The application's interface to a board: its microcontroller, or a virtual sensor on the host.
 pub trait Board {
-    /// The sensor's bus, for registers.
-    type Bus<'a>: SpiDevice<u8>
-    where
-        Self: 'a;
-    /// Waits between frames and during the self-test.
-    type Delay<'a>: DelayNs
-    where
-        Self: 'a;
-
     /// Time since the start in microseconds.
     fn now_us(&mut self) -> u64;
     /// Sleeps until the next interrupt.
     fn sleep(&mut self) {}
-    /// Bus and delay. May be called only while sampling is disabled.
-    fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
+    /// The sensor's bus, for registers, and its delay. May be called only while sampling is disabled.
+    fn sensor_bus(&mut self) -> (impl SpiDevice<u8>, impl DelayNs);
     /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in
     /// Hz. May be called only while sampling is disabled.
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
@@ -159,7 +150,6 @@ pub struct Uptime {
 
 impl Uptime {
     /// The uptime that is 0 at counter value `counter`.
-    #[must_use]
     pub const fn new(counter: u32) -> Self {
         Self { last: counter, total_us: 0 }
     }

@@ -38,6 +38,10 @@ pub(crate) fn wait_for(mut flag: impl FnMut() -> bool) -> bool {
     (0..READINGS).any(|_| flag())
 }
 
+pub(crate) fn flag_in_time(flag: impl FnMut() -> bool) -> Result<(), BusFault> {
+    if wait_for(flag) { Ok(()) } else { Err(BusFault::Timeout) }
+}
+
 /// Waits for at least `ns`; the wait is bounded even if the counter stands still.
 pub(crate) fn wait_ns<M: MicrosecondCounter>(ns: u32) {
     if ns > 0 {
@@ -123,10 +127,9 @@ fn perform<M: MicrosecondCounter>(
     operation: &mut Operation<'_, u8>,
 ) -> Result<(), BusFault> {
     match operation {
-        Operation::Read(read) => read.iter_mut().try_for_each(|byte| {
-            *byte = bytes.exchange(0)?;
-            Ok(())
-        }),
+        Operation::Read(read) => {
+            read.iter_mut().try_for_each(|byte| bytes.exchange(0).map(|received| *byte = received))
+        }
         Operation::Write(write) => write.iter().try_for_each(|&byte| bytes.exchange(byte).map(|_| ())),
         Operation::Transfer(read, write) => (0..read.len().max(write.len())).try_for_each(|index| {
             let received = bytes.exchange(write.get(index).copied().unwrap_or(0))?;
@@ -135,10 +138,9 @@ fn perform<M: MicrosecondCounter>(
             }
             Ok(())
         }),
-        Operation::TransferInPlace(words) => words.iter_mut().try_for_each(|byte| {
-            *byte = bytes.exchange(*byte)?;
-            Ok(())
-        }),
+        Operation::TransferInPlace(words) => {
+            words.iter_mut().try_for_each(|byte| bytes.exchange(*byte).map(|received| *byte = received))
+        }
         Operation::DelayNs(ns) => {
             wait_ns::<M>(*ns);
             Ok(())

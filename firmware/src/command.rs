@@ -5,7 +5,7 @@ use crate::bench_console::{hexadecimal, register};
 use crate::receive::LOST;
 use adis16405_driver::{GyroRange, Register};
 use heapless::Vec;
-use link::{TextLine, text_line};
+use link::{TextLine, text};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
@@ -68,11 +68,23 @@ static COMMANDS: [(&str, Form, &str); 35] = {
         ("settings, with Enter:", Title, ""),
         ("f RATE", Thousandths(C::Rate), "sample rate in Hz, such as f 819.2"),
         ("g RANGE", Number(range), "gyro range in deg/s: 75, 150 or 300"),
-        ("n TAPS", Number(filter), "filter, log2 of the taps of each stage: 0 to 6"),
+        (
+            "n TAPS",
+            Number(|taps| (taps <= 6).then_some(C::Filter(taps as u8))),
+            "filter, log2 of the taps of each stage: 0 to 6",
+        ),
         ("e SECONDS", Number(|s| Some(C::Epoch(s))), "length of an epoch, 0 for one without end"),
         ("i SECONDS", Number(|s| Some(C::Interval(s))), "time between reports, 0 for none"),
-        ("w 1, w 0", Number(|on| switch(on, C::RawStream)), "start and stop the raw stream of bursts"),
-        ("p ID", Number(product_id), "take a part with this PROD_ID for an ADIS16405, 0 for none"),
+        (
+            "w 1, w 0",
+            Number(|on| (on <= 1).then_some(C::RawStream(on == 1))),
+            "start and stop the raw stream of bursts",
+        ),
+        (
+            "p ID",
+            Number(|id| Some(C::ProductId(id.try_into().ok()?))),
+            "take a part with this PROD_ID for an ADIS16405, 0 for none",
+        ),
         ("persist", Word(C::Persist), "keep settings and learned models without power"),
         ("forget", Word(C::Forget), "erase what is kept"),
         ("clear", Word(C::ResetStatistics), "reset the statistics"),
@@ -99,8 +111,8 @@ static COMMANDS: [(&str, Form, &str); 35] = {
 /// Line of the help at an index.
 pub fn help(index: usize) -> Option<TextLine> {
     COMMANDS.get(index).map(|(usage, form, help)| match form {
-        Form::Title => text_line(format_args!("{usage}")),
-        _ => text_line(format_args!("{usage:<10} {help}")),
+        Form::Title => text!("{usage}"),
+        _ => text!("{usage:<10} {help}"),
     })
 }
 
@@ -111,18 +123,6 @@ fn range(degrees: u32) -> Option<Command> {
         75 => GyroRange::Dps75,
         _ => return None,
     }))
-}
-
-fn filter(taps_log2: u32) -> Option<Command> {
-    (taps_log2 <= 6).then_some(Command::Filter(taps_log2 as u8))
-}
-
-fn product_id(number: u32) -> Option<Command> {
-    u16::try_from(number).ok().map(Command::ProductId)
-}
-
-fn switch(number: u32, command: fn(bool) -> Command) -> Option<Command> {
-    (number <= 1).then(|| command(number == 1))
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

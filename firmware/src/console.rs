@@ -7,9 +7,8 @@ use crate::command::help;
 use crate::device::DeviceState;
 use crate::number_text::Decimal;
 use crate::report_text;
-use core::fmt::Arguments;
 use heapless::Deque;
-use link::{ClockSource, Health, TextLine, text_line};
+use link::{ClockSource, Health, TextLine, text};
 
 pub(crate) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
 
@@ -31,8 +30,7 @@ pub(crate) struct Console {
 
 impl Console {
     /// Queues a line behind the waiting ones, and drops the oldest if there are too many.
-    pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
-        let line = text_line(text);
+    pub(crate) fn print(&mut self, board: &mut impl Board, line: TextLine) {
         if self.lines.is_empty() && board.transmit_queue(|queue| queue.send_text(&line)) {
             return;
         }
@@ -53,10 +51,10 @@ impl Console {
         board.transmit_queue(|queue| queue.has_room())
     }
 
-    pub(crate) fn answer(&mut self, board: &mut impl Board, answer: Answer) {
-        if self.answers.push_back(answer).is_err() {
-            self.print(board, format_args!("busy: too many answers waiting; repeat the command"));
-        }
+    /// Queues an answer; a line instead if too many wait.
+    pub(crate) fn answer(&mut self, answer: Answer) -> Option<TextLine> {
+        let is_full = self.answers.push_back(answer).is_err();
+        is_full.then(|| text!("busy: too many answers waiting; repeat the command"))
     }
 
     pub(crate) fn has_answers(&self) -> bool {
@@ -108,37 +106,32 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
     AnswerLine::Text(match index {
         0 => {
             let sensor = if state.is_sampled() { "sampled" } else { "being probed" };
-            text_line(format_args!("up {} s, sensor {sensor}, SCK {} Hz", now_us / 1_000_000, state.spi_clock_hz))
+            text!("up {} s, sensor {sensor}, SCK {} Hz", now_us / 1_000_000, state.spi_clock_hz)
         }
         1 => {
             let measured = board.estimators(|estimators| estimators.measured_hz());
             let programmed = Decimal::significant(state.config.sample_period().hz(), 5);
             let (sens_avg, measured) = (state.config.sens_avg(), Decimal::significant(measured.unwrap_or(f64::NAN), 6));
-            text_line(format_args!("rate {programmed} Hz, measured {measured} Hz, SENS_AVG {sens_avg:#06x}"))
+            text!("rate {programmed} Hz, measured {measured} Hz, SENS_AVG {sens_avg:#06x}")
         }
         2 => {
             let samples = board.estimators(|estimators| estimators.channel(0).map(|estimator| estimator.len()));
             let (epoch, length) = (state.settings.epoch, state.settings.user.epoch_s);
             let (samples, age) = (samples.unwrap_or(0), state.epoch_age_s(now_us));
-            text_line(format_args!("{samples} samples, epoch {epoch}, begun {age} s ago, length {length} s"))
+            text!("{samples} samples, epoch {epoch}, begun {age} s ago, length {length} s")
         }
         3 => {
             let losses = board.estimators(|estimators| estimators.losses(false));
             let (lost, [a, b, c, d, e, f, t, v]) = (losses.lost, losses.refused);
-            text_line(format_args!(
-                "missing: {lost} lost; refused gyros {a} {b} {c}, accelerometers {d} {e} {f}, temp {t}, supply {v}"
-            ))
+            text!("missing: {lost} lost; refused gyros {a} {b} {c}, accelerometers {d} {e} {f}, temp {t}, supply {v}")
         }
-        4 => text_line(format_args!(
-            "start {}: {:?}, {} channels restored",
-            boot.starts, boot.cause, boot.restored_channels
-        )),
+        4 => text!("start {}: {:?}, {} channels restored", boot.starts, boot.cause, boot.restored_channels),
         5 => match boot.clock {
-            ClockSource::Crystal => text_line(format_args!("clock: crystal")),
-            ClockSource::Internal => text_line(format_args!("clock: internal oscillator, the crystal did not start")),
+            ClockSource::Crystal => text!("clock: crystal"),
+            ClockSource::Internal => text!("clock: internal oscillator, the crystal did not start"),
         },
-        6 if boot.safe_mode => text_line(format_args!("{SAFE_MODE}")),
-        7 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
+        6 if boot.safe_mode => text!("{SAFE_MODE}"),
+        7 if !boot.crash_record.is_empty() => text!("crash record: {}", boot.crash_record),
         6 | 7 => return AnswerLine::Skip,
         _ => return AnswerLine::End,
     })
@@ -146,9 +139,7 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
 
 fn counter_line(health: &Health, index: usize) -> AnswerLine {
     match health.counters().get(index) {
-        Some(counter) => {
-            (counter.value > 0).then(|| text_line(format_args!("{} {}", counter.name, counter.value))).into()
-        }
+        Some(counter) => (counter.value > 0).then(|| text!("{} {}", counter.name, counter.value)).into(),
         None => AnswerLine::End,
     }
 }

@@ -14,7 +14,6 @@ pub struct CrashRecord(Slot<{ 1 + TEXT_WORDS }>);
 
 impl CrashRecord {
     /// A record without text.
-    #[must_use]
     pub const fn blank() -> Self {
         Self(Slot::blank())
     }

@@ -22,14 +22,27 @@ pub(crate) const PAIRS: [(usize, usize); 25] = {
     pairs
 };
 
-/// Sums of products of second differences of channel pairs by octave, and of counts. A sum stays below 2⁹⁰ for 2⁴⁰
-/// samples and is stored in 64 + 32 bits.
+/// Sum of products of second differences of a pair, in 64 + 32 bits: it stays below 2⁹⁰ for 2⁴⁰ samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct ProductSum {
+    low: u64,
+    high: i32,
+    /// Number of products; it rises once in 32 samples at most.
+    count: u32,
+}
+
+impl ProductSum {
+    const NONE: Self = Self { low: 0, high: 0, count: 0 };
+
+    fn sum(self) -> i128 {
+        i128::from(self.high) << 64 | i128::from(self.low)
+    }
+}
+
+/// Sums over channel pairs by octave, and of counts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct CrossSums {
-    low: [[u64; PAIRS.len()]; CROSS_OCTAVES],
-    high: [[i32; PAIRS.len()]; CROSS_OCTAVES],
-    /// Number of products; it rises once in 32 samples at most.
-    counts: [[u32; PAIRS.len()]; CROSS_OCTAVES],
+    products: [[ProductSum; PAIRS.len()]; CROSS_OCTAVES],
     totals: [i64; CHANNELS.len()],
     /// Samples in any channel, and refused counts per channel.
     samples: u64,
@@ -41,9 +54,7 @@ pub(crate) struct CrossSums {
 impl CrossSums {
     pub(crate) const fn new() -> Self {
         Self {
-            low: [[0; PAIRS.len()]; CROSS_OCTAVES],
-            high: [[0; PAIRS.len()]; CROSS_OCTAVES],
-            counts: [[0; PAIRS.len()]; CROSS_OCTAVES],
+            products: [[ProductSum::NONE; PAIRS.len()]; CROSS_OCTAVES],
             totals: [0; CHANNELS.len()],
             samples: 0,
             refused_counts: [0; CHANNELS.len()],
@@ -52,10 +63,8 @@ impl CrossSums {
     }
 
     pub(crate) fn reset(&mut self) {
-        // The arrays are filled in place: a new value would put 5 kB on the stack.
-        self.low.fill([0; PAIRS.len()]);
-        self.high.fill([0; PAIRS.len()]);
-        self.counts.fill([0; PAIRS.len()]);
+        // The array is filled in place: a new value would put 5 kB on the stack.
+        self.products.fill([ProductSum::NONE; PAIRS.len()]);
         (self.totals, self.samples, self.refused_counts) = ([0; CHANNELS.len()], 0, [0; CHANNELS.len()]);
         self.incomplete = false;
     }
@@ -98,22 +107,17 @@ impl CrossSums {
     }
 
     fn add_products(&mut self, row: usize, differences: &[Option<i64>; CHANNELS.len()]) {
-        // `get_mut` avoids a panic in the sampling path.
-        let (Some(low), Some(high)) = (self.low.get_mut(row), self.high.get_mut(row)) else { return };
-        let Some(counts) = self.counts.get_mut(row) else { return };
+        // `get` and `get_mut` avoid a panic in the sampling path.
+        let Some(products) = self.products.get_mut(row) else { return };
         let difference = |of: usize| differences.get(of).copied().flatten();
-        for (((low, high), count), (a, b)) in low.iter_mut().zip(high).zip(counts).zip(PAIRS) {
+        for (product, (a, b)) in products.iter_mut().zip(PAIRS) {
             if let (Some(a), Some(b)) = (difference(a), difference(b)) {
-                let sum = wide(*low, *high) + i128::from(a) * i128::from(b);
-                (*low, *high) = (sum as u64, (sum >> 64) as i32);
-                *count = count.saturating_add(1);
+                let sum = product.sum() + i128::from(a) * i128::from(b);
+                (product.low, product.high) = (sum as u64, (sum >> 64) as i32);
+                product.count = product.count.saturating_add(1);
             }
         }
     }
-}
-
-fn wide(low: u64, high: i32) -> i128 {
-    i128::from(high) << 64 | i128::from(low)
 }
 
 const NOT_OBSERVED: f64 = 0.0;
@@ -144,8 +148,9 @@ impl AllanCovariances {
         self.means = core::array::from_fn(|index| sums.totals[index] as f64 / samples(index) as f64);
         for (pair, covariances) in self.pairs.iter_mut().enumerate() {
             for (k, covariance) in covariances.iter_mut().enumerate() {
-                let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
-                let sum = wide(sums.low[k][pair], sums.high[k][pair]) as f64;
+                let product = sums.products[k][pair];
+                let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(product.count));
+                let sum = product.sum() as f64;
                 // An observed sum of 0 is stored as −0, since +0 is [`NOT_OBSERVED`].
                 let sum = if sum == 0.0 { -0.0 } else { sum };
                 *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { NOT_OBSERVED };
@@ -154,7 +159,6 @@ impl AllanCovariances {
     }
 
     /// Allan covariance at averaging factor `n`, in counts of both; `None` if not estimated, as for two gyros.
-    #[must_use]
     pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
         let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
         let octave = (n.trailing_zeros() as usize).checked_sub(FIRST_CROSS_OCTAVE).filter(|_| n.is_power_of_two())?;
@@ -192,7 +196,7 @@ mod tests {
 
     fn observed(sums: &CrossSums, a: usize, b: usize) -> u32 {
         let pair = PAIRS.iter().position(|&pair| pair == (a, b)).expect("a pair");
-        sums.counts[0][pair]
+        sums.products[0][pair].count
     }
 
     /// Gyro x loses forty samples from the 600th on, more than n = 256 bridges. Other pairs lose nothing.

@@ -13,7 +13,7 @@ use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdenti
 use crate::status_flags::StatusFlags;
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
 use core::fmt::Arguments;
-use link::{Boot, Health, MessageRef, text_line};
+use link::{Boot, Health, MessageRef, text, text_line};
 
 /// Configuration at the first start: 204.8 samples a second, ±300 °/s, no filter.
 pub const FIRST_CONFIG: Config = {
@@ -59,11 +59,16 @@ pub(crate) struct DeviceState {
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorState {
     /// The sensor is to be probed at this time, as this step of recovery or, for `None`, on request.
-    Probing { at_us: u64, step: Option<RecoveryStep> },
-    /// The sensor has been sampled since this time.
-    Sampled { since_us: u64 },
-    /// The microcontroller is to be restarted at this time.
-    Restarting { at_us: u64 },
+    Probing {
+        at_us: u64,
+        step: Option<RecoveryStep>,
+    },
+    Sampled {
+        since_us: u64,
+    },
+    Restarting {
+        at_us: u64,
+    },
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -104,8 +109,8 @@ impl DeviceState {
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
                 let (is_intact, trouble, used, settled, flagged_us) = board.estimators(|estimators| {
-                    let (used, settled) = (estimators.used_since_probe > 0, estimators.is_settled());
-                    let flagged_us = estimators.monitor.last_edge_us().filter(|_| estimators.error_flag);
+                    let (used, settled) = (estimators.since_probe.used > 0, estimators.is_settled());
+                    let flagged_us = estimators.monitor.last_edge_us().filter(|_| estimators.since_probe.error_flag);
                     (estimators.monitor.has_period(), estimators.trouble(now_us), used, settled, flagged_us)
                 });
                 if !is_intact {
@@ -206,7 +211,7 @@ impl DeviceState {
         // The sensor may be in low-power mode.
         let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.user.prod_id)
-            .map_err(|error| text_line(format_args!("{error}")));
+            .map_err(|error| text!("{error}"));
         self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {
             Ok(identity) => {
@@ -276,7 +281,7 @@ impl DeviceState {
         board.set_sampling(false);
         let diagnosis = read_diagnosis(board.sensor_bus(), self.config);
         board.set_sampling(true);
-        board.estimators(|estimators| estimators.error_flag = false);
+        board.estimators(|estimators| estimators.since_probe.error_flag = false);
         if let Some(causes) = self.status_flags.add(diagnosis, now_us, &mut self.counters) {
             event!(warn, "DIAG_STAT {}", causes);
             log(board, format_args!("sensor: DIAG_STAT {causes}"));

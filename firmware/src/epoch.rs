@@ -9,6 +9,7 @@ use crate::statistics::{
     AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
 };
 use adis16405_driver::{Channel, Config};
+use allan_core::confidence::NORMAL_975;
 use allan_core::regression::{Covariate, CovariateRegression, Sensitivity};
 use allan_core::{AllanPoint, Curve};
 use heapless::Vec;
@@ -22,7 +23,6 @@ pub struct FinishedEpoch {
     pub number: u32,
     /// Measured sample rate in Hz; `None` if too few samples have come.
     pub measured_hz: Option<f64>,
-    /// The sums of [`CHANNELS`].
     pub(crate) sums: [ChannelSums; CHANNELS.len()],
     pub(crate) covariances: AllanCovariances,
 }
@@ -48,19 +48,16 @@ impl FinishedEpoch {
     }
 
     /// The scale of the samples, which were taken with this configuration.
-    #[must_use]
     pub fn scale(&self, config: Config) -> ReportScale {
         ReportScale::new(config, self.measured_hz)
     }
 
     /// The sums of [`CHANNELS`]`[index]`; `None` if there is no such channel.
-    #[must_use]
     pub fn sums(&self, index: usize) -> Option<&ChannelSums> {
         self.sums.get(index)
     }
 
     /// The Allan covariances; `None` if samples are missing in them, as after a restart.
-    #[must_use]
     pub fn covariances(&self) -> Option<&AllanCovariances> {
         self.covariances.complete.then_some(&self.covariances)
     }
@@ -77,6 +74,14 @@ pub struct Regressor {
     pub error: f64,
     /// Value of the covariate at which the correction is 0, in its unit: the mean of the learned epoch.
     pub reference: f64,
+}
+
+impl Regressor {
+    /// The 95 % bounds of the sensitivity.
+    pub(crate) fn bounds(&self) -> (f64, f64) {
+        let half_width = NORMAL_975 * self.error;
+        (self.value - half_width, self.value + half_width)
+    }
 }
 
 /// The regressors of one channel.
@@ -187,7 +192,6 @@ impl EpochChannel<'_> {
 
     /// Change of the means of the stream and of the compensated stream since the means `before` (counts), in the
     /// channel's unit.
-    #[must_use]
     pub(crate) fn mean_shift(self, regressors: &[Regressor], before: &ChannelMeans) -> Option<ReportedShift> {
         let means = &self.epoch.covariances()?.means;
         let change = |index: usize| (means[index] - before[index]) * self.other(index).lsb();

@@ -74,22 +74,22 @@ impl<const W: u32> GrossErrorGate<W> {
         self.samples += 1;
         if self.is_learning() {
             self.learn(counts);
-            return gross;
-        }
-        let any_refused = !refused.is_empty();
-        for (index, (channel, &count)) in self.channels.iter_mut().zip(counts).enumerate() {
-            if any_refused && refused.contains(index) {
-                continue;
+        } else {
+            let any_refused = !refused.is_empty();
+            for (index, (channel, &count)) in self.channels.iter_mut().zip(counts).enumerate() {
+                if any_refused && refused.contains(index) {
+                    continue;
+                }
+                let difference = count - channel.last;
+                // One comparison finds differences outside ±limit.
+                if (difference + channel.limit) as u32 > 2 * channel.limit as u32 {
+                    gross.insert_if(index, channel.is_gross(count, self.samples));
+                    continue;
+                }
+                channel.last = count;
+                // A square is at most (2¹⁴)².
+                channel.sum = channel.sum.saturating_add((difference * difference) as u32);
             }
-            let difference = count - channel.last;
-            // One comparison finds differences outside ±limit.
-            if (difference + channel.limit) as u32 > 2 * channel.limit as u32 {
-                gross.insert_if(index, channel.is_gross(count, self.samples));
-                continue;
-            }
-            channel.last = count;
-            // A square is at most (2¹⁴)².
-            channel.sum = channel.sum.saturating_add((difference * difference) as u32);
         }
         self.left -= 1;
         if self.left == 0 {
@@ -101,13 +101,7 @@ impl<const W: u32> GrossErrorGate<W> {
     /// Learns from a sample. It is rare, and so not inlined.
     #[inline(never)]
     fn learn(&mut self, counts: &[i32; CHANNELS.len()]) {
-        for (channel, &count) in self.channels.iter_mut().zip(counts) {
-            channel.learn(count);
-        }
-        self.left -= 1;
-        if self.left == 0 {
-            self.end_block();
-        }
+        self.channels.iter_mut().zip(counts).for_each(|(channel, &count)| channel.learn(count));
     }
 
     #[inline(never)]

@@ -1,11 +1,10 @@
 //! Learning: each inertial channel's model is fitted to one epoch and validated on the next.
 
 use crate::epoch::{EpochChannel, FinishedEpoch, Regressor, Regressors};
-use crate::report_messages::{model_error, reported_term};
+use crate::report_messages::{model_error, reported_coefficient};
 use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL};
 use adis16405_driver::Config;
-use allan_core::confidence::NORMAL_975;
 use allan_core::fit::fit;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::MovingAverageFilter;
@@ -13,8 +12,8 @@ use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Trace, trace_while
 use allan_core::{Model, NoiseTerm};
 use heapless::Vec;
 use link::{
-    LearnedMessage, MAX_COVARIATES, MAX_DEVIATIONS, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations,
-    ReportedModelError, ReportedParameter, ReportedRegressor, ValidationMessage,
+    LearnedMessage, MAX_COVARIATES, MAX_DEVIATIONS, ReportedAddedTerm, ReportedDeviations, ReportedModelError,
+    ReportedParameter, ReportedRegressor, ValidationMessage,
 };
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +39,6 @@ impl EpochModel {
     pub(crate) const EMPTY: Self = Self { baseline: None, full: Vec::new(), regressors: Vec::new() };
 
     /// The model of N, B and K; `None` before the first fit.
-    #[must_use]
     pub(crate) fn baseline(&self, scale: ReportScale) -> Option<Model> {
         Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), scale))
     }
@@ -51,7 +49,6 @@ impl EpochModel {
     }
 
     /// The model with all terms; `None` before the first fit.
-    #[must_use]
     fn full(&self, scale: ReportScale) -> Option<Model> {
         (!self.full.is_empty()).then(|| model(self.full.iter().copied(), scale))
     }
@@ -90,7 +87,6 @@ pub struct EpochFit {
 
 impl EpochFit {
     /// A fit with these [regressors](EpochChannel::estimate_regressors), before its [run](Self::run).
-    #[must_use]
     pub fn new(regressors: Regressors) -> Self {
         Self { baseline: None, regressors, trace: Trace::empty() }
     }
@@ -119,14 +115,12 @@ impl EpochFit {
     }
 
     /// The model that was fitted.
-    #[must_use]
     pub fn model(&self) -> EpochModel {
         let full = self.trace.after.terms().iter().map(|term| (term.kind, term.value)).collect();
         EpochModel { baseline: self.baseline, full, regressors: self.regressors.clone() }
     }
 
     /// The message about the fit of [`CHANNELS`]`[index]` to the epoch with the number `epoch`.
-    #[must_use]
     pub fn message(&self, index: usize, epoch: u32) -> LearnedMessage {
         let Self { regressors, trace, .. } = self;
         LearnedMessage {
@@ -142,7 +136,6 @@ impl EpochFit {
 
 /// Validates the model of a channel on an epoch; `means` are those of the epoch before. `None` before the first fit, or
 /// without covariances.
-#[must_use]
 pub fn validate(
     model: &EpochModel,
     means: Option<&ChannelMeans>,
@@ -173,21 +166,15 @@ fn fill_compensated(model: &EpochModel, channel: EpochChannel<'_>, message: &mut
 }
 
 fn reported_regressor(regressor: &Regressor) -> ReportedRegressor {
-    let half_width = NORMAL_975 * regressor.error;
-    ReportedRegressor {
-        covariate: CHANNELS[regressor.covariate] as u8,
-        value: regressor.value,
-        low: regressor.value - half_width,
-        high: regressor.value + half_width,
-        reference: regressor.reference,
-    }
+    let (low, high) = regressor.bounds();
+    let Regressor { covariate, value, reference, .. } = *regressor;
+    ReportedRegressor { covariate: CHANNELS[covariate] as u8, value, low, high, reference }
 }
 
 fn reported_added_term(found: &AddedTerm, model: &Model) -> ReportedAddedTerm {
     let term = &model.terms()[found.term];
-    let FittedTerm { kind, value, low, high, .. } = *term;
     ReportedAddedTerm {
-        coefficient: ReportedCoefficient { term: reported_term(kind), value, low, high },
+        coefficient: reported_coefficient(term),
         shape: term.shape_parameters().map(|(_, value, (low, high))| ReportedParameter { value, low, high }).collect(),
         score: found.score,
         n: found.residual.n,
@@ -221,11 +208,6 @@ impl Learner {
         self.models = [const { EpochModel::EMPTY }; INERTIAL];
         self.errors = [None; INERTIAL];
         self.means = None;
-    }
-
-    /// The finished epoch; `None` during a fit.
-    pub(crate) fn finished(&self) -> Option<&FinishedEpoch> {
-        self.finished.as_deref()
     }
 
     pub(crate) fn validate(&mut self, index: usize, config: Config) -> Option<ValidationMessage> {

@@ -6,31 +6,6 @@
 //!  acquisition (two interrupts)                (interrupt)   (main loop)
 //! ```
 //!
-//! | module | content |
-//! |---|---|
-//! | `board`, `microcontroller` | the interface of a board to the application; code that the images of all boards share
-//! |
-//! | `bus_frame` | frames on the sensor's bus: times of chip select, operations |
-//! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
-//! | [`sensor`] | serial clock, probing, auto-null |
-//! | `sample_intake` | the path of every sample into the statistics, health counters |
-//! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve and baseline model made of them |
-//! | `gross_error_gate` | single samples that noise does not explain |
-//! | `scale` | the unit of a count and the measured time between two samples |
-//! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
-//! | [`learner`] | models fitted to a finished epoch and validated on the next |
-//! | `device` | state of the device, supervision of the sensor |
-//! | `recovery`, `status_flags` | steps that recover a sensor in trouble; counts of the causes in its status register |
-//! | `watchdog` | proof that every task is alive and the clock runs, for the watchdog |
-//! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
-//! | `report_text`, [`number_text`] | the report as a table for people; numbers in it |
-//! | [`console`], `answer`, `bench_console` | answers in text; registers, bus times and deflections for a bench |
-//! | `event`, `counters` | output for a debug probe: events, and counters that have risen |
-//! | `transmit`, `receive`, [`usb_port`] | the queues to and from the serial ports, raw stream; the USB port |
-//! | [`command`], `app` | commands, main loop |
-//! | [`retained`], `slot`, `epoch_record`, `crash_record` | state that a warm reset keeps |
-//! | `stored_state`, [`settings_store`] | state that survives a loss of power, and its flash memory |
-//!
 //! Sampling has priority over the estimators, and these over the main loop. Interrupts that share a locked resource
 //! wait; locks are short.
 #![no_std]

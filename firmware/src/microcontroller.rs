@@ -36,44 +36,26 @@ pub struct UartQueues {
     pub receive: Receiver<'static>,
 }
 
-/// A USB port, and the application's ends of its queues.
-pub struct UsbParts<U> {
-    /// The port.
-    pub port: U,
-    /// Bytes to be sent.
-    pub transmit: Producer<'static, u8>,
-    /// Bytes received.
-    pub receive: Consumer<'static, u8>,
-}
+/// A USB port, and the application's ends of its queues: bytes to be sent, bytes received.
+pub type UsbParts<U> = (U, (Producer<'static, u8>, Consumer<'static, u8>));
 
-impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
-    /// Starts the port of a product, with the board's number (at most twelve bytes) in hexadecimal. `reconnect` takes
-    /// the controller off the bus (false) or starts it again (true). `None` after the first call, or with too few
-    /// endpoints.
-    pub fn start(
-        bus: &'static UsbBusAllocator<B>,
-        product: UsbVidPid,
-        board_number: impl IntoIterator<Item = u8>,
-        reconnect: fn(bool),
-    ) -> Option<Self> {
-        let serial_number = cortex_m::singleton!(SERIAL_NUMBER: String<24> = String::new())?;
-        for byte in board_number {
-            write!(serial_number, "{byte:02X}").ok()?;
-        }
-        let to_port = cortex_m::singleton!(USB_TRANSMIT: TransmitBuffer = TransmitBuffer::new())?;
-        let from_port = cortex_m::singleton!(USB_RECEIVE: ReceiveBuffer = ReceiveBuffer::new())?;
-        let ((transmit, to_port), (from_port, receive)) = (to_port.split(), from_port.split());
-        let port = UsbPort::new(bus, product, serial_number, (to_port, Receiver::new(from_port)), reconnect)?;
-        Some(Self { port, transmit, receive })
+/// Starts the USB port of a product, with the board's number (at most twelve bytes) in hexadecimal. `reconnect` takes the
+/// controller off the bus (false) or starts it again (true). `None` after the first call, or with too few endpoints.
+pub fn start_usb<B: UsbBus>(
+    bus: &'static UsbBusAllocator<B>,
+    product: UsbVidPid,
+    board_number: impl IntoIterator<Item = u8>,
+    reconnect: fn(bool),
+) -> Option<UsbParts<UsbPort<'static, B>>> {
+    let serial_number = cortex_m::singleton!(SERIAL_NUMBER: String<24> = String::new())?;
+    for byte in board_number {
+        write!(serial_number, "{byte:02X}").ok()?;
     }
-}
-
-impl<U> UsbParts<U> {
-    /// The port and the queues of a board that has them.
-    #[must_use]
-    pub fn split(parts: Option<Self>) -> (Option<U>, Option<Producer<'static, u8>>, Option<Consumer<'static, u8>>) {
-        parts.map_or((None, None, None), |Self { port, transmit, receive }| (Some(port), Some(transmit), Some(receive)))
-    }
+    let to_port = cortex_m::singleton!(USB_TRANSMIT: TransmitBuffer = TransmitBuffer::new())?;
+    let from_port = cortex_m::singleton!(USB_RECEIVE: ReceiveBuffer = ReceiveBuffer::new())?;
+    let ((transmit, to_port), (from_port, receive)) = (to_port.split(), from_port.split());
+    let port = UsbPort::new(bus, product, serial_number, (to_port, Receiver::new(from_port)), reconnect)?;
+    Some((port, (transmit, receive)))
 }
 
 /// A port that a microcontroller does not have.
@@ -151,6 +133,11 @@ pub trait Microcontroller: Watchdog {
     /// Feeds a watchdog that is shorter than a step of the main loop. To be called [`processor::WAKE_HZ`] times a
     /// second.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
+}
+
+/// The first cause whose flag is set.
+fn first_cause<const N: usize>(causes: [(bool, BootCause); N]) -> BootCause {
+    causes.into_iter().find(|(is_set, _)| *is_set).map_or(BootCause::Unknown, |(_, cause)| cause)
 }
 
 /// The data-ready pin, which raises an interrupt at rising edges.

@@ -39,7 +39,6 @@ pub struct Decimal {
 
 impl Decimal {
     /// The number with `digits` significant digits: `0.0368`, `2.43`, `1,200`.
-    #[must_use]
     pub fn significant(value: f64, digits: i32) -> Self {
         let magnitude = libm::fabs(value);
         if magnitude == 0.0 || magnitude.is_nan() || magnitude >= TOO_LARGE {

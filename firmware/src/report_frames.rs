@@ -23,15 +23,15 @@ const fn decimal(digits: &str) -> u8 {
 }
 
 impl DeviceState {
-    /// The message of device and settings; it sets the measured rate of the whole report.
-    fn hello(&mut self, ends_epoch: bool, board: &mut impl Board) -> Hello {
-        let finished = self.learner.finished().filter(|_| ends_epoch);
+    /// Sends device and settings; sets the measured rate of the whole report.
+    pub(crate) fn send_hello(&mut self, ends_epoch: bool, board: &mut impl Board) {
+        let finished = self.learner.finished.as_deref().filter(|_| ends_epoch);
         let (number, finished_hz) =
             finished.map_or((self.settings.epoch, None), |epoch| (epoch.number, epoch.measured_hz));
         let measured_hz =
             if ends_epoch { finished_hz } else { board.estimators(|estimators| estimators.measured_hz()) };
         self.report_scale = ReportScale::new(self.config, measured_hz);
-        Hello {
+        let hello = Hello {
             firmware: VERSION,
             product_id: self.product_id,
             gyro_full_scale: match self.config.range() {
@@ -48,11 +48,7 @@ impl DeviceState {
             epoch: number,
             epoch_s: self.settings.user.epoch_s,
             boot: self.boot.clone(),
-        }
-    }
-
-    pub(crate) fn send_hello(&mut self, ends_epoch: bool, board: &mut impl Board) {
-        let hello = self.hello(ends_epoch, board);
+        };
         send(board, MessageRef::Hello(&hello));
     }
 
@@ -75,7 +71,7 @@ impl DeviceState {
     }
 
     fn reported_sums(&self, index: usize, ends_epoch: bool, board: &mut impl Board) -> ChannelSums {
-        match self.learner.finished().filter(|_| ends_epoch) {
+        match self.learner.finished.as_deref().filter(|_| ends_epoch) {
             Some(epoch) => epoch.sums(index).cloned().unwrap_or(ChannelSums::EMPTY),
             None => running_sums(board, index),
         }

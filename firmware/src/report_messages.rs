@@ -3,13 +3,13 @@
 use crate::channels::{ChannelEstimator, OCTAVES};
 use crate::statistics::ChannelSums;
 use adis16405_driver::Channel;
-use allan_core::{Curve, Model, NoiseTerm, model};
+use allan_core::model::{Discrepancy, FittedTerm};
+use allan_core::{Curve, Model, NoiseTerm};
 use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
 
 impl ChannelSums {
     /// The report on one channel, without losses; `unseen_error` is the error of the previous epoch's model.
-    #[must_use]
     pub fn report(
         &self,
         channel: Channel,
@@ -35,11 +35,7 @@ impl ChannelSums {
             ReportedOctave { n: point.n, sum, count, interpolation: point.interpolation as f32 }
         });
         report.octaves.extend(octaves.take(link::MAX_OCTAVES));
-        let coefficient = |term: &model::FittedTerm| {
-            let (value, low, high) = (term.value, term.low, term.high);
-            ReportedCoefficient { term: reported_term(term.kind), value, low, high }
-        };
-        let coefficients = baseline.into_iter().flat_map(Model::terms).map(coefficient);
+        let coefficients = baseline.into_iter().flat_map(Model::terms).map(reported_coefficient);
         report.coefficients.extend(coefficients.take(link::MAX_COEFFICIENTS));
         report
     }
@@ -47,12 +43,13 @@ impl ChannelSums {
 
 /// Error of a model on a curve; `None` without comparable octaves.
 pub(crate) fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> Option<ReportedModelError> {
-    let error = allan_core::model::Discrepancy::between(model, curve)?;
+    let error = Discrepancy::between(model, curve)?;
     Some(ReportedModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent })
 }
 
-pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
-    match kind {
+pub(crate) fn reported_coefficient(fitted: &FittedTerm) -> ReportedCoefficient {
+    let FittedTerm { kind, value, low, high, .. } = *fitted;
+    let term = match kind {
         NoiseTerm::Quantization => ReportedTerm::Quantization,
         NoiseTerm::AngleRandomWalk => ReportedTerm::AngleRandomWalk,
         NoiseTerm::BiasInstability => ReportedTerm::BiasInstability,
@@ -63,5 +60,6 @@ pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
         NoiseTerm::Markov(_) => ReportedTerm::Markov,
         NoiseTerm::Resonance(_) => ReportedTerm::Resonance,
         NoiseTerm::Sinusoid(_) => ReportedTerm::Sinusoid,
-    }
+    };
+    ReportedCoefficient { term, value, low, high }
 }

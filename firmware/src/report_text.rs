@@ -9,8 +9,7 @@ use crate::number_text::{Count, Decimal, Estimate};
 use crate::report_frames::running_sums;
 use crate::sample_intake::Estimators;
 use allan_core::NoiseTerm;
-use allan_core::confidence::NORMAL_975;
-use link::{TextLine, text_line};
+use link::{TextLine, text};
 
 type Line<B> = fn(&DeviceState, &mut B, usize) -> Option<TextLine>;
 
@@ -24,7 +23,7 @@ pub(crate) fn line<B: Board>(state: &DeviceState, board: &mut B, mut index: usiz
         (|state, board, index| Some(coefficients(state, board, index)), GYROS),
         (|_, _, _| Some(row(["accel", "ug/sqrt(Hz)", "ug", "ug/sqrt(s)", ""])), 1),
         (|state, board, index| Some(coefficients(state, board, GYROS + index)), INERTIAL - GYROS),
-        (|_, _, _| Some(text_line(format_args!("{BOUNDS}"))), 1),
+        (|_, _, _| Some(text!("{BOUNDS}")), 1),
         (|_, _, _| Some(TextLine::new()), 1),
         (|state, _, index| found(&state.learner.models, index), INERTIAL * MAX_FINDINGS),
         (|_, board, index| curve(board, index), OCTAVES + 2),
@@ -42,8 +41,8 @@ const BOUNDS: &str = "95 % bounds by octaves: 2 to 9 % wider than those of all s
 
 /// A row of 8, 20, 19, 19 and 13 columns.
 fn row([label, n, b, k, error]: [&str; 5]) -> TextLine {
-    let line = text_line(format_args!(" {label:<7}{n:<20}{b:<19}{k:<19}{error:>13}"));
-    text_line(format_args!("{}", line.trim_end()))
+    let line = text!(" {label:<7}{n:<20}{b:<19}{k:<19}{error:>13}");
+    text!("{}", line.trim_end())
 }
 
 fn headline(state: &DeviceState, board: &mut impl Board) -> TextLine {
@@ -52,22 +51,19 @@ fn headline(state: &DeviceState, board: &mut impl Board) -> TextLine {
     let (epoch, seconds, rate) =
         (state.settings.epoch, Count((samples as f64 / hz) as u64), Decimal::significant(hz, 4));
     match state.product_id {
-        0 => text_line(format_args!("No sensor has answered yet")),
-        part => text_line(format_args!(
-            "ADIS{part}   {} samples   {seconds} s at {rate} Hz   epoch {epoch}",
-            Count(samples)
-        )),
+        0 => text!("No sensor has answered yet"),
+        part => text!("ADIS{part}   {} samples   {seconds} s at {rate} Hz   epoch {epoch}", Count(samples)),
     }
 }
 
 fn record(state: &DeviceState, board: &mut impl Board) -> TextLine {
     let losses = board.estimators(|estimators| estimators.losses(false));
     let refused = losses.refused[..INERTIAL].iter().copied().max().unwrap_or(0);
-    let lost = text_line(format_args!("{} lost, {} refused at most", Count(losses.lost), Count(refused)));
+    let lost = text!("{} lost, {} refused at most", Count(losses.lost), Count(refused));
     let age = state.epoch_age_s(board.now_us());
     match u64::from(state.settings.user.epoch_s) {
-        0 => text_line(format_args!("{lost}; the epoch has no end")),
-        length => text_line(format_args!("{lost}; the epoch ends in {} s", Count(length.saturating_sub(age)))),
+        0 => text!("{lost}; the epoch has no end"),
+        length => text!("{lost}; the epoch ends in {} s", Count(length.saturating_sub(age))),
     }
 }
 
@@ -82,15 +78,15 @@ fn coefficients(state: &DeviceState, board: &mut impl Board, index: usize) -> Te
         Some(term) => {
             let factor = factors[column];
             let bounds = (factor * term.low, factor * term.high);
-            text_line(format_args!("{}", Estimate { value: factor * term.value, bounds }))
+            text!("{}", Estimate { value: factor * term.value, bounds })
         }
-        None => text_line(format_args!("-")),
+        None => text!("-"),
     });
     let error = state.learner.errors[index].map_or_else(TextLine::new, |(before, after)| {
-        text_line(format_args!("{} -> {}", Decimal::significant(before, 2), Decimal::significant(after, 2)))
+        text!("{} -> {}", Decimal::significant(before, 2), Decimal::significant(after, 2))
     });
     let mark = if state.recovery.failed_test.contains(index) { "fail" } else { "" };
-    let axis = text_line(format_args!("{} {mark}", axis(index)));
+    let axis = text!("{} {mark}", axis(index));
     row([axis.trim_end(), &cells[0], &cells[1], &cells[2], &error])
 }
 
@@ -102,25 +98,24 @@ fn axis(index: usize) -> &'static str {
 fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
     let (channel, number) = (index / MAX_FINDINGS, index % MAX_FINDINGS);
     let (model, unit) = (models.get(channel)?, CHANNELS[channel].unit());
-    let label = text_line(format_args!(" {} {}", if channel < GYROS { "gyro" } else { "accel" }, axis(channel)));
+    let label = text!(" {} {}", if channel < GYROS { "gyro" } else { "accel" }, axis(channel));
     if let Some(regressor) = model.regressors.get(number) {
         let covariate = CHANNELS[regressor.covariate];
-        let half_width = NORMAL_975 * regressor.error;
-        let bounds = (regressor.value - half_width, regressor.value + half_width);
-        let (estimate, of) = (Estimate { value: regressor.value, bounds }, covariate.unit());
-        return Some(text_line(format_args!("{label:<9}{:<32}{estimate} {unit}/{of}", covariate.name())));
+        let estimate = Estimate { value: regressor.value, bounds: regressor.bounds() };
+        let of = covariate.unit();
+        return Some(text!("{label:<9}{:<32}{estimate} {unit}/{of}", covariate.name()));
     }
     let (term, value) = model.added_terms().nth(number - model.regressors.len())?;
     let three = |value| Decimal::significant(value, 3);
     let name = match term {
-        NoiseTerm::Filtered(filter) => text_line(format_args!("filter of {} taps", three(f64::from(filter.taps)))),
-        NoiseTerm::Sinusoid(line) => text_line(format_args!("sinusoid, {} Hz", three(line.frequency))),
+        NoiseTerm::Filtered(filter) => text!("filter of {} taps", three(f64::from(filter.taps))),
+        NoiseTerm::Sinusoid(line) => text!("sinusoid, {} Hz", three(line.frequency)),
         NoiseTerm::Resonance(line) => {
-            text_line(format_args!("resonance, {} Hz, {} Hz wide", three(line.frequency), three(line.bandwidth)))
+            text!("resonance, {} Hz, {} Hz wide", three(line.frequency), three(line.bandwidth))
         }
-        NoiseTerm::Markov(noise) => text_line(format_args!("Gauss-Markov, {} s", three(noise.time_constant))),
-        NoiseTerm::Quantization => text_line(format_args!("quantization")),
-        NoiseTerm::RateRamp => text_line(format_args!("rate ramp")),
+        NoiseTerm::Markov(noise) => text!("Gauss-Markov, {} s", three(noise.time_constant)),
+        NoiseTerm::Quantization => text!("quantization"),
+        NoiseTerm::RateRamp => text!("rate ramp"),
         // These terms are part of the baseline, or are not traced.
         NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk | NoiseTerm::LowPass(_) => {
             return None;
@@ -132,23 +127,22 @@ fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
         NoiseTerm::RateRamp => "/s",
         _ => "",
     };
-    Some(text_line(format_args!("{label:<9}{name:<32}{} {unit}{per}", three(value))))
+    Some(text!("{label:<9}{name:<32}{} {unit}{per}", three(value)))
 }
 
 /// A line of the table of Allan deviations: title, head, octaves; `None` without values.
 fn curve(board: &mut impl Board, line: usize) -> Option<TextLine> {
     match line {
-        0 => Some(text_line(format_args!("Allan deviation, gyros in deg/s, accelerometers in mg"))),
+        0 => Some(text!("Allan deviation, gyros in deg/s, accelerometers in mg")),
         1 => Some(octave_cells("tau/s", ["gyro x", "gyro y", "gyro z", "accel x", "accel y", "accel z"])),
         line => board.estimators(|estimators| octave_row(estimators, line - 2)),
     }
 }
 
 fn octave_cells(tau: &str, [a, b, c, d, e, f]: [&str; INERTIAL]) -> TextLine {
-    text_line(format_args!("{tau:>9}{a:>11}{b:>11}{c:>11}{d:>11}{e:>11}{f:>11}"))
+    text!("{tau:>9}{a:>11}{b:>11}{c:>11}{d:>11}{e:>11}{f:>11}")
 }
 
-/// The row of an octave; `None` without values.
 fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
     let scale = estimators.scale();
     let n = (1_u64 << octave.min(OCTAVES)) as f64;
@@ -158,8 +152,7 @@ fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
         Some(factor * scale.lsb(CHANNELS[index]) * libm::sqrt(variance))
     };
     let deviations: [Option<f64>; INERTIAL] = core::array::from_fn(deviation);
-    let cells =
-        deviations.map(|value| text_line(format_args!("{}", Decimal::significant(value.unwrap_or(f64::NAN), 4))));
-    let tau = text_line(format_args!("{}", Decimal::significant(n * scale.period_s(), 4)));
+    let cells = deviations.map(|value| text!("{}", Decimal::significant(value.unwrap_or(f64::NAN), 4)));
+    let tau = text!("{}", Decimal::significant(n * scale.period_s(), 4));
     deviations.iter().any(Option::is_some).then(|| octave_cells(&tau, cells.each_ref().map(|cell| cell.as_str())))
 }

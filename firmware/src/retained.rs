@@ -31,7 +31,6 @@ pub struct RetainedMemory {
 }
 
 /// A [`RetainedMemory`] without records.
-#[must_use]
 pub const fn blank_memory() -> RetainedMemory {
     let records = [const { Slot::blank() }; KINDS + 1];
     RetainedMemory { records, epoch: Slot::blank(), crashes: Slot::blank() }
@@ -59,13 +58,8 @@ impl UserSettings {
     }
 
     pub(crate) fn config(self) -> Option<Config> {
-        let range = match self.sens_avg >> 8 {
-            0b100 => GyroRange::Dps300,
-            0b010 => GyroRange::Dps150,
-            0b001 => GyroRange::Dps75,
-            _ => return None,
-        };
-        Config::new(range, self.sens_avg as u8, SamplePeriod::from_register(self.smpl_prd)?).ok()
+        let (range, period) = (GyroRange::from_sens_avg(self.sens_avg)?, SamplePeriod::from_register(self.smpl_prd)?);
+        Config::new(range, self.sens_avg as u8, period).ok().filter(|config| config.sens_avg() == self.sens_avg)
     }
 }
 
@@ -124,7 +118,6 @@ pub struct RetainedRam {
 
 impl RetainedRam {
     /// Opens the memory and finds the newest valid version of every record.
-    #[must_use]
     pub fn open(memory: &'static RetainedMemory) -> Self {
         Self::open_by(BUILD, memory)
     }
@@ -188,13 +181,11 @@ impl RetainedRam {
     }
 
     /// The settings that were written last.
-    #[must_use]
     pub fn settings(&self) -> Option<RetainedSettings> {
         self.settings
     }
 
     /// Sums of [`CHANNELS`]`[index]`; `None` unless of the present generation and settings.
-    #[must_use]
     pub fn restore(&self, index: usize) -> Option<ChannelSums> {
         let (slot, _) = self.newest.get(1 + index).copied()??;
         let (mut words, mut sums) = (self.memory.records[slot].words(), ChannelSums::EMPTY);

@@ -1,6 +1,6 @@
 //! The path of samples: data-ready monitor, validation, statistics, counters.
 
-use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
+use crate::acquisition::{DataReadyMonitor, TimedBurst};
 use crate::channels::ChannelSet;
 use crate::counters::add;
 use crate::gross_error_gate::{FIRST_BLOCK, GrossErrorGate};
@@ -41,6 +41,19 @@ pub(crate) enum SensorTrouble {
     Unusable(&'static str),
 }
 
+/// State that a probe of the sensor resets.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SinceProbe {
+    /// Score of +2 per unusable and −1 per usable burst.
+    unusable: u32,
+    unusable_cause: &'static str,
+    /// Bursts until the filter has settled, and then until the gate has learned.
+    settling: u32,
+    learning: u32,
+    pub(crate) used: u32,
+    pub(crate) error_flag: bool,
+}
+
 /// The estimators of all channels. A lost sample is missing in all of them, a refused one in its channel.
 pub struct Estimators<'m> {
     config: Config,
@@ -51,15 +64,8 @@ pub struct Estimators<'m> {
     pub(crate) monitor: DataReadyMonitor,
     /// Counters without the validator's, which are added on reading.
     health: Health,
-    /// Score of +2 per unusable and −1 per usable burst.
-    unusable: u32,
-    unusable_cause: &'static str,
+    pub(crate) since_probe: SinceProbe,
     repeated: u32,
-    /// Bursts until the filter has settled.
-    settling: u32,
-    learning: u32,
-    pub(crate) used_since_probe: u32,
-    pub(crate) error_flag: bool,
     processed: u32,
     next_sample: u64,
     pub(crate) raw_stream: RawStream,
@@ -76,13 +82,8 @@ impl<'m> Estimators<'m> {
             monitor: DataReadyMonitor::new(config.sample_period()),
             finished_losses: SampleLosses::NONE,
             health: Health::default(),
-            unusable: 0,
-            unusable_cause: "",
+            since_probe: SinceProbe::default(),
             repeated: 0,
-            settling: 0,
-            learning: 0,
-            used_since_probe: 0,
-            error_flag: false,
             processed: 0,
             next_sample: 0,
             raw_stream: RawStream::off(),
@@ -95,7 +96,7 @@ impl<'m> Estimators<'m> {
         let health = &mut self.health;
         health.queue_peak = health.queue_peak.max(u32::try_from(waiting).unwrap_or(u32::MAX).saturating_add(1));
         add(&mut health.queue_full, timed.dropped);
-        let DrdyEdge::Periods(periods) = self.monitor.edge(timed.at_us) else {
+        let Some(periods) = self.monitor.edge(timed.at_us) else {
             add(&mut health.spurious_edges, 1);
             return false;
         };
@@ -112,7 +113,7 @@ impl<'m> Estimators<'m> {
     /// True if the sensor must be probed before its samples are used again.
     #[must_use]
     pub fn is_suspect(&self) -> bool {
-        self.monitor.is_suspect() || self.unusable >= 2 * UNUSABLE_BURSTS
+        self.monitor.is_suspect() || self.since_probe.unusable >= 2 * UNUSABLE_BURSTS
     }
 
     /// The reason for a probe at `now_us`, if any.
@@ -122,16 +123,15 @@ impl<'m> Estimators<'m> {
         } else if self.monitor.is_suspect() {
             Some(SensorTrouble::EdgeRate)
         } else {
-            self.is_suspect().then_some(SensorTrouble::Unusable(self.unusable_cause))
+            self.is_suspect().then_some(SensorTrouble::Unusable(self.since_probe.unusable_cause))
         }
     }
 
     pub(crate) fn is_settled(&self) -> bool {
-        self.used_since_probe >= SETTLED_BURSTS.max(2 * self.frozen_after())
+        self.since_probe.used >= SETTLED_BURSTS.max(2 * self.frozen_after())
     }
 
     /// Number of bursts taken from the queue, modulo 2³².
-    #[must_use]
     pub fn processed(&self) -> u32 {
         self.processed
     }
@@ -139,11 +139,8 @@ impl<'m> Estimators<'m> {
     /// Accepts samples after a probe at `now_us`, once the filter has settled.
     pub fn accept_samples_after_settling(&mut self, now_us: u64) {
         self.monitor.restart_at(now_us);
-        self.unusable = 0;
-        self.settling = settling_samples(self.config);
-        self.learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
-        self.used_since_probe = 0;
-        self.error_flag = false;
+        let learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
+        self.since_probe = SinceProbe { settling: settling_samples(self.config), learning, ..SinceProbe::default() };
     }
 
     /// Starts again with the configuration `config`; the raw stream stays as it is.
@@ -179,7 +176,6 @@ impl<'m> Estimators<'m> {
     }
 
     /// The estimator of [`CHANNELS`]`[index]`.
-    #[must_use]
     pub fn channel(&self, index: usize) -> Option<&ChannelEstimator> {
         self.statistics.estimators.get(index)
     }
@@ -197,25 +193,21 @@ impl<'m> Estimators<'m> {
     }
 
     /// The configuration that the sensor is assumed to have.
-    #[must_use]
     pub fn config(&self) -> Config {
         self.config
     }
 
     /// Sample rate in Hz, measured with the microcontroller's clock; `None` before 64 sample periods.
-    #[must_use]
     pub fn measured_hz(&self) -> Option<f64> {
         self.monitor.measured_hz()
     }
 
     /// The scale of counts and samples.
-    #[must_use]
     pub fn scale(&self) -> ReportScale {
         ReportScale::new(self.config, self.measured_hz())
     }
 
     /// The counters of sampling and estimating; those of the application and the board are 0.
-    #[must_use]
     pub fn health(&self) -> Health {
         let (counters, mut health) = (self.validator.counters(), self.health);
         health.bursts = counters.bursts;
@@ -238,7 +230,7 @@ impl<'m> Estimators<'m> {
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
             return;
         }
-        if self.settling + self.learning > 0 && is_frame_sound(burst) {
+        if self.since_probe.settling + self.since_probe.learning > 0 && is_frame_sound(burst) {
             return self.settle(burst);
         }
         let mut validity = self.validator.validate(burst);
@@ -256,9 +248,9 @@ impl<'m> Estimators<'m> {
         if refused.has_all_inertial() {
             return self.mark_unusable(faults.cause().unwrap_or_default());
         }
-        self.unusable = self.unusable.saturating_sub(1);
-        self.used_since_probe = self.used_since_probe.saturating_add(1);
-        self.error_flag = faults.contains(Faults::ERROR_ALARM);
+        self.since_probe.unusable = self.since_probe.unusable.saturating_sub(1);
+        self.since_probe.used = self.since_probe.used.saturating_add(1);
+        self.since_probe.error_flag = faults.contains(Faults::ERROR_ALARM);
         let health = &mut self.health;
         add(&mut health.used, 1);
         add(&mut health.gross_errors, u32::from(!gross.is_empty()));
@@ -270,11 +262,11 @@ impl<'m> Estimators<'m> {
     #[inline(never)]
     fn settle(&mut self, burst: &Burst) {
         let counts = estimated_counts(burst);
-        if self.settling > 0 {
-            self.settling -= 1;
+        if self.since_probe.settling > 0 {
+            self.since_probe.settling -= 1;
             self.gate.follow(&counts);
         } else {
-            self.learning -= 1;
+            self.since_probe.learning -= 1;
             self.gate.find(&counts, ChannelSet::EMPTY);
         }
         add(&mut self.health.settling, 1);
@@ -290,8 +282,8 @@ impl<'m> Estimators<'m> {
     }
 
     fn mark_unusable(&mut self, cause: &'static str) {
-        self.unusable = self.unusable.saturating_add(2);
-        self.unusable_cause = cause;
+        self.since_probe.unusable = self.since_probe.unusable.saturating_add(2);
+        self.since_probe.unusable_cause = cause;
     }
 }
 

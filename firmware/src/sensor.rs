@@ -1,6 +1,8 @@
 //! The sensor's bus outside of sampling: clock, probe, auto-null.
 
-use adis16405_driver::{Adis16405, Channel, Config, Diagnosis, DioSignal, Error, GyroBias, Product, Register, Timing};
+use adis16405_driver::{
+    Adis16405, Channel, Config, Diagnosis, DioSignal, Error, GyroBias, Product, Register, SelfTest, Timing,
+};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -12,7 +14,6 @@ pub(crate) const LOW_POWER_LIMIT_HZ: u32 = 300_000;
 
 /// The field of CR1 for the largest clock of at most `limit_hz`, or for the slowest one, and that clock in Hz, rounded
 /// up: `bus_hz` over `2^(field + 1)`. Some HALs round the requested clock up, above the sensor's limit.
-#[must_use]
 pub fn prescaled_clock(bus_hz: u32, limit_hz: u32) -> (u8, u32) {
     let clock_hz = |field: u8| bus_hz.div_ceil(2 << field);
     let field = (0..8).find(|&field| clock_hz(field) <= limit_hz).unwrap_or(7);
@@ -48,60 +49,48 @@ pub struct SensorIdentity {
     pub test: Option<TestOutcome>,
 }
 
-/// Outcome of a self-test. None makes samples unusable, since motion fails it too (data sheet Rev. B, page 15).
+/// Outcome of a self-test, `None` if it did not end. None makes samples unusable, since motion fails it too (data sheet
+/// Rev. B, page 15).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TestOutcome {
-    /// The test ended with these flags, among them those of failed sensors.
-    Ended(Diagnosis),
-    /// The test was not seen to run; these are the flags.
-    NotSeen(Diagnosis),
-    /// The test did not end.
-    Endless,
-}
+pub struct TestOutcome(Option<SelfTest>);
 
 impl TestOutcome {
-    /// True if it has run and no sensor has failed.
-    #[must_use]
-    pub fn passed(self) -> bool {
-        matches!(self, Self::Ended(diagnosis) if !diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES))
+    pub(crate) fn passed(self) -> bool {
+        self.0.is_some_and(|test| test.passed())
     }
 
-    /// The sensors that have failed.
-    pub fn failed_sensors(self) -> impl Iterator<Item = Channel> {
-        let diagnosis = match self {
-            Self::Ended(diagnosis) | Self::NotSeen(diagnosis) => diagnosis,
-            Self::Endless => Diagnosis::empty(),
-        };
-        diagnosis.failed_sensors()
+    pub(crate) fn failed_sensors(self) -> impl Iterator<Item = Channel> {
+        self.0.into_iter().flat_map(|test| test.diagnosis.failed_sensors())
+    }
+
+    fn name(self) -> &'static str {
+        match self.0 {
+            Some(test) if test.passed() => "passed",
+            Some(test) if test.ran => "failed",
+            Some(_) => "did not run",
+            None => "did not end",
+        }
     }
 }
 
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 impl defmt::Format for TestOutcome {
     fn format(&self, f: defmt::Formatter<'_>) {
-        match self {
-            Self::Ended(_) if self.passed() => defmt::write!(f, "passed"),
-            Self::Ended(_) => {
-                defmt::write!(f, "failed:");
-                self.failed_sensors().for_each(|channel| defmt::write!(f, " {=str}", channel.name()));
-            }
-            Self::NotSeen(_) => defmt::write!(f, "did not run"),
-            Self::Endless => defmt::write!(f, "did not end"),
-        }
+        defmt::write!(f, "{=str}", self.name());
+        self.failed_sensors().for_each(|channel| defmt::write!(f, " {=str}", channel.name()));
     }
 }
 
 impl fmt::Display for TestOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Ended(diagnosis) if self.passed() => write!(f, "passed, DIAG_STAT {:#06x}", diagnosis.bits()),
-            Self::Ended(diagnosis) => {
-                write!(f, "failed, DIAG_STAT {:#06x}:", diagnosis.bits())?;
-                self.failed_sensors().try_for_each(|channel| write!(f, " {}", channel.name()))
-            }
-            Self::NotSeen(diagnosis) => write!(f, "did not run, DIAG_STAT {:#06x}", diagnosis.bits()),
-            Self::Endless => write!(f, "did not end"),
+        f.write_str(self.name())?;
+        let Some(test) = self.0 else { return Ok(()) };
+        write!(f, ", DIAG_STAT {:#06x}", test.diagnosis.bits())?;
+        if self.name() != "failed" {
+            return Ok(());
         }
+        f.write_str(":")?;
+        self.failed_sensors().try_for_each(|channel| write!(f, " {}", channel.name()))
     }
 }
 
@@ -127,18 +116,14 @@ pub fn probe<SPI: SpiDevice<u8>>(
         let _ = sensor.wake();
     }
     let product = if scope.reset { sensor.software_reset()? } else { sensor.init()? };
-    let test = if scope.self_test { Some(self_test(&mut sensor)?) } else { None };
+    let test = match scope.self_test.then(|| sensor.self_test()) {
+        None => None,
+        Some(Ok(test)) => Some(TestOutcome(Some(test))),
+        Some(Err(Error::Deadline { .. })) => Some(TestOutcome(None)),
+        Some(Err(error)) => return Err(error),
+    };
     sensor.set_data_ready(Some(DioSignal::default()))?;
     Ok(SensorIdentity { product, test })
-}
-
-fn self_test<SPI: SpiDevice<u8>>(sensor: &mut Adis16405<SPI, impl DelayNs>) -> Result<TestOutcome, Error<SPI::Error>> {
-    match sensor.self_test() {
-        Ok(test) if test.ran => Ok(TestOutcome::Ended(test.diagnosis)),
-        Ok(test) => Ok(TestOutcome::NotSeen(test.diagnosis)),
-        Err(Error::Deadline { .. }) => Ok(TestOutcome::Endless),
-        Err(error) => Err(error),
-    }
 }
 
 /// Reads and so clears DIAG_STAT; `None` if the bus failed or all bits are set, one of which is undefined.

@@ -13,9 +13,7 @@ use allan_core::{Cascade, Curve, Interpolation, Model, NoiseTerm, OctaveSums, fi
 /// The statistics of the running epoch.
 #[derive(Debug)]
 pub struct Statistics {
-    /// Estimators of [`CHANNELS`].
     pub(crate) estimators: [ChannelEstimator; CHANNELS.len()],
-    /// Sums over pairs of channels.
     pub(crate) cross_sums: CrossSums,
     pub(crate) losses: SampleLosses,
 }
@@ -34,7 +32,6 @@ impl SampleLosses {
 
 impl Statistics {
     /// Statistics of no sample.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             estimators: [const { ChannelEstimator::new() }; CHANNELS.len()],
@@ -111,7 +108,6 @@ impl ChannelSums {
         Self { samples: 0, missing: 0, octaves: [(0, 0); OCTAVES], gaps: [Interpolation::NONE; OCTAVES] };
 
     /// Copies the sums of an estimator.
-    #[must_use]
     pub fn from_estimator(estimator: &ChannelEstimator) -> Self {
         let mut sums = Self { samples: estimator.len(), missing: estimator.missing(), ..Self::EMPTY };
         for octave in 0..OCTAVES {
@@ -127,7 +123,6 @@ impl ChannelSums {
     }
 
     /// The Allan variance curve of a channel in its unit.
-    #[must_use]
     pub fn curve(&self, channel: Channel, scale: ReportScale) -> Curve<OCTAVES> {
         let mut curve = Curve::empty();
         ChannelEstimator::rebuild_curve(&mut curve, scale.period_s(), self.samples, |octave| self.octave(octave));
@@ -136,7 +131,6 @@ impl ChannelSums {
     }
 
     /// Fits the baseline model (N, B and K) to the curve of a channel, in its unit.
-    #[must_use]
     pub fn fit_baseline(&self, channel: Channel, scale: ReportScale) -> Model {
         fit(&self.curve(channel, scale), &NoiseTerm::BASELINE)
     }

@@ -10,17 +10,16 @@ const READ_US: u64 = 1_000_000;
 /// Time after which a persistent cause is logged again, µs.
 const LOG_US: u64 = 600_000_000;
 
-type CounterOf = fn(&mut Health) -> &mut u32;
-
-const CAUSES: [(Diagnosis, &str, CounterOf); 8] = [
-    (Diagnosis::SUPPLY_LOW, "supply_low", |health| &mut health.diag_supply_low),
-    (Diagnosis::SUPPLY_HIGH, "supply_high", |health| &mut health.diag_supply_high),
-    (Diagnosis::FLASH_UPDATE, "flash_update", |health| &mut health.diag_flash_update),
-    (Diagnosis::SPI, "spi", |health| &mut health.diag_spi),
-    (Diagnosis::OVER_RANGE, "over_range", |health| &mut health.diag_over_range),
-    (Diagnosis::SELF_TEST_FAILURES, "self_test", |health| &mut health.diag_self_test),
-    (Diagnosis::FLASH_CHECKSUM, "flash_checksum", |health| &mut health.diag_flash_checksum),
-    (Diagnosis::ALARM_1.union(Diagnosis::ALARM_2), "alarm", |health| &mut health.diag_alarm),
+/// Causes, with the names of their counters.
+const CAUSES: [(Diagnosis, &str); 8] = [
+    (Diagnosis::SUPPLY_LOW, "diag_supply_low"),
+    (Diagnosis::SUPPLY_HIGH, "diag_supply_high"),
+    (Diagnosis::FLASH_UPDATE, "diag_flash_update"),
+    (Diagnosis::SPI, "diag_spi"),
+    (Diagnosis::OVER_RANGE, "diag_over_range"),
+    (Diagnosis::SELF_TEST_FAILURES, "diag_self_test"),
+    (Diagnosis::FLASH_CHECKSUM, "diag_flash_checksum"),
+    (Diagnosis::ALARM_1.union(Diagnosis::ALARM_2), "diag_alarm"),
 ];
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -46,8 +45,8 @@ impl StatusFlags {
         self.next_read_us = now_us + READ_US;
         let diagnosis = diagnosis?;
         add(&mut counters.diag_reads, 1);
-        for (_, _, counter) in CAUSES.iter().filter(|(cause, ..)| diagnosis.intersects(*cause)) {
-            add(counter(counters), 1);
+        for (_, name) in CAUSES.iter().filter(|(cause, _)| diagnosis.intersects(*cause)) {
+            counters.counter_mut(name).into_iter().for_each(|counter| add(counter, 1));
         }
         if now_us >= self.forget_us {
             (self.logged, self.forget_us) = (Diagnosis::empty(), now_us + LOG_US);
@@ -63,7 +62,8 @@ pub(crate) struct CauseList(Diagnosis);
 
 impl CauseList {
     fn names(self) -> impl Iterator<Item = &'static str> {
-        CAUSES.into_iter().filter(move |(cause, ..)| self.0.intersects(*cause)).map(|(_, name, _)| name)
+        let causes = CAUSES.into_iter().filter(move |(cause, _)| self.0.intersects(*cause));
+        causes.filter_map(|(_, name)| name.strip_prefix("diag_"))
     }
 }
 

@@ -29,19 +29,16 @@ impl<'q> TransmitQueue<'q> {
     }
 
     /// Adds a queue for copies to USB, if there is one.
-    #[must_use]
     pub fn with_usb(self, usb: Option<spsc::Producer<'q, u8>>) -> Self {
         Self { usb, ..self }
     }
 
     /// True if there is room for the longest message and the raw reserve.
-    #[must_use]
     pub fn has_room(&self) -> bool {
         free(&self.uart) >= MAX_FRAME + RAW_RESERVE
     }
 
     /// Messages and text lines for which the USB port had no room.
-    #[must_use]
     pub fn usb_dropped(&self) -> u32 {
         self.usb_dropped
     }

@@ -17,6 +17,12 @@ pub fn text_line(text: fmt::Arguments<'_>) -> TextLine {
     line
 }
 
+/// Formats a [text line](TextLine) as `format!` does a `String`.
+#[macro_export]
+macro_rules! text {
+    ($($text:tt)*) => { $crate::text_line(format_args!($($text)*)) };
+}
+
 /// Writes as many characters as fit.
 struct Truncating<'a>(&'a mut TextLine);
 

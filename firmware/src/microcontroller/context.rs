@@ -113,15 +113,6 @@ impl<'r, B: BoardSupport, S, E> BoardContext<'r, B, S, E> {
 impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstimation>> Board
     for BoardContext<'_, B, S, E>
 {
-    type Bus<'a>
-        = LockedBus<'a, S>
-    where
-        Self: 'a;
-    type Delay<'a>
-        = FeedingDelay<'a, B::Microcontroller>
-    where
-        Self: 'a;
-
     fn now_us(&mut self) -> u64 {
         self.sampling.lock(|sampling| sampling.now_us())
     }
@@ -135,7 +126,7 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
         });
     }
 
-    fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>) {
+    fn sensor_bus(&mut self) -> (impl SpiDevice<u8>, impl DelayNs) {
         (LockedBus(&mut self.sampling), FeedingDelay(&mut self.watchdog))
     }
 
@@ -155,11 +146,11 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
     }
 
     fn set_bus_timing(&mut self, timing: BusTiming) {
-        self.sampling.lock(|sampling| sampling.bus.set_timing(timing));
+        self.sampling.lock(|sampling| sampling.bus.select.timing = timing);
     }
 
     fn frame_times(&mut self) -> FrameTimes {
-        self.sampling.lock(|sampling| sampling.bus.take_frame_times())
+        self.sampling.lock(|sampling| sampling.bus.select.take_times())
     }
 
     fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
@@ -256,7 +247,7 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
 }
 
 /// The bus, locked for one transaction at a time.
-pub struct LockedBus<'a, S>(&'a mut S);
+struct LockedBus<'a, S>(&'a mut S);
 
 impl<S> ErrorType for LockedBus<'_, S> {
     type Error = BusFault;

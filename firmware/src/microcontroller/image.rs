@@ -90,7 +90,7 @@ macro_rules! observatory {
                 Blinker, ESTIMATOR_CYCLES, SAMPLING_CYCLES, count_lost_bytes, measure, start_systick,
             };
             use $crate::microcontroller::{
-                BoardParts, BoardSupport, Microcontroller, OutputOf, UartQueues, UsbOf, UsbParts,
+                BoardParts, BoardSupport, Microcontroller, OutputOf, UartQueues, UsbOf,
             };
             use $crate::{
                 BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, MicrosecondCounter as _, ReceiveBuffer,
@@ -130,7 +130,8 @@ macro_rules! observatory {
                 let (to_estimators, bursts) = context.local.burst_queue.split();
                 let BoardParts { cause, clock, core_hz, data_ready, bus, uart, usb, led, reset_line } =
                     <$board>::start(context.device, UartQueues { transmit, receive: Receiver::new(receive) });
-                let (usb, to_usb, from_usb) = UsbParts::split(usb);
+                let (usb, usb_queues) = usb.unzip();
+                let (to_usb, from_usb) = usb_queues.unzip();
                 start_systick(context.core.SYST, core_hz);
                 let (boot, retained) = restore(cause, clock);
                 let estimation = SharedEstimation {

@@ -1,6 +1,6 @@
 //! The sensor's bus: register frames byte by byte, bursts by DMA, the timing of chip select.
 
-use crate::board::{BusTiming, FrameTimes};
+use crate::board::BusTiming;
 use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, MicrosecondCounter, transfer, wait_ns};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use core::convert::Infallible;
@@ -41,7 +41,7 @@ pub enum BurstEnd<'a> {
 /// The sensor on an SPI peripheral, with its chip select.
 pub struct SensorSpi<P, S> {
     peripheral: P,
-    select: ChipSelect<S>,
+    pub(super) select: ChipSelect<S>,
     received: &'static mut [u8; BURST_BYTES],
     /// Bytes of the burst whose transfer was started.
     started: usize,
@@ -71,16 +71,6 @@ impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
         self.select.set_clock_limit(limit_hz);
         self.peripheral.drain();
         self.peripheral.set_clock_limit(limit_hz)
-    }
-
-    /// Sets other bus times from the next frame on.
-    pub fn set_timing(&mut self, timing: BusTiming) {
-        self.select.timing = timing;
-    }
-
-    /// The times of the frames since the last call.
-    pub fn take_frame_times(&mut self) -> FrameTimes {
-        self.select.take_times()
     }
 
     /// Drops what was received, and resets the peripheral.

@@ -3,25 +3,8 @@
 use crate::settings_store::SettingsStore;
 use core::marker::PhantomData;
 use core::ops::Range;
-use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
-
-/// Failure of a flash operation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FlashError {
-    /// The bytes are outside of the memory for the settings, or not whole units.
-    OutOfBounds,
-    /// The flash does not take the operation.
-    Refused,
-}
-
-impl NorFlashError for FlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self {
-            Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
-            Self::Refused => NorFlashErrorKind::Other,
-        }
-    }
-}
+pub use embedded_storage_async::nor_flash::NorFlashErrorKind as FlashError;
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 
 /// The flash memory of a microcontroller, which reads it as memory.
 pub trait FlashMemory {

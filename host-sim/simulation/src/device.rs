@@ -3,6 +3,7 @@
 use crate::fault_injector::{FaultEnd, FaultyBus, InjectedFaults};
 use crate::sample_audit::{Received, SampleAudit, lengths};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst};
+use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::settings_store::StoreError;
@@ -14,7 +15,7 @@ use heapless::spsc::Consumer;
 use link::{Boot, BootCause, Health};
 use std::cell::RefMut;
 use std::collections::VecDeque;
-use virtual_sensor::{EmulatedBus, VirtualAdis16405, VirtualDelay};
+use virtual_sensor::{EmulatedBus, VirtualAdis16405};
 
 /// SCK of the sensor's bus, Hz.
 const SCK_HZ: u32 = 1_000_000;
@@ -310,9 +311,6 @@ impl SimulatedBoard {
 }
 
 impl Board for SimulatedBoard {
-    type Bus<'a> = FaultyBus;
-    type Delay<'a> = VirtualDelay;
-
     fn now_us(&mut self) -> u64 {
         if self.follow_part() {
             // A delay of the driver feeds the watchdog, as on a board.
@@ -321,7 +319,7 @@ impl Board for SimulatedBoard {
         self.now_us
     }
 
-    fn sensor_bus(&mut self) -> (FaultyBus, VirtualDelay) {
+    fn sensor_bus(&mut self) -> (impl SpiDevice<u8>, impl DelayNs) {
         (self.bus.clone(), self.bus.bus().delay())
     }
 

@@ -9,15 +9,15 @@ const LONGEST_STEP: f64 = 64.0;
 /// Least distance of a wrong stamp, usual intervals.
 const WRONG: f64 = 16.0;
 const FIRST_WRONG: f64 = 1e4;
-/// Rows that confirm a set clock, or doubt the first row.
+/// Rows that confirm a set clock, or doubt the first row; most wrong stamps in a row.
 pub const ROWS_OF_SET_CLOCK: usize = 32;
 pub const ROWS_OF_FIRST: usize = 8;
 /// Rows before which a clock may be set forward.
 const ROWS_BEFORE_SET: u64 = 256;
 
-/// 15, 16, 24, 31 and 32 bits; second, minute, hour, day and week in s, ms, us and ns.
+/// 10 to 32 bits; second, minute, hour, day and week in s, ms, us and ns.
 fn moduli() -> impl Iterator<Item = f64> {
-    let counters = [15, 16, 24, 31, 32].into_iter().map(|bits| (1u64 << bits) as f64);
+    let counters = (10..=32).map(|bits| (1u64 << bits) as f64);
     let periods = [1.0, 60.0, 3600.0, 86_400.0, 604_800.0];
     let clocks = [1.0, 1e3, 1e6, 1e9].into_iter().flat_map(move |unit| periods.map(|period| period * unit));
     counters.chain(clocks.filter(|period| *period > 50.0))
@@ -27,8 +27,8 @@ fn moduli() -> impl Iterator<Item = f64> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
     Next(f64),
-    /// Follows the second last; the last is wrong.
-    AfterWrong(f64),
+    /// Follows an earlier one; so many last ones are wrong.
+    AfterWrong(f64, usize),
     /// Follows, with the clock set forward by the second number.
     AfterSet(f64, f64),
     Back(f64),
@@ -38,8 +38,8 @@ pub enum Order {
 #[derive(Debug, Default)]
 pub struct StampOrder {
     offset: f64,
-    before_last: Option<f64>,
-    last: Option<f64>,
+    /// The last times that were accepted.
+    last: VecDeque<f64>,
     intervals: VecDeque<f64>,
     accepted: u64,
     wraps: u64,
@@ -60,7 +60,7 @@ impl StampOrder {
     /// Judges the stamp of the next row.
     pub fn judge(&mut self, stamp: f64) -> Order {
         let time = stamp + self.offset;
-        let Some(last) = self.last.filter(|last| time < *last) else {
+        let Some(last) = self.last.back().copied().filter(|last| time < *last) else {
             return match self.set_forward(time) {
                 Some(by) => Order::AfterSet(time - by, by),
                 None => Order::Next(time),
@@ -79,15 +79,14 @@ impl StampOrder {
             self.offset += modulus;
             return Order::Next(time + modulus);
         }
-        match self.before_last {
-            Some(before)
-                if time >= before && time - before <= LONGEST_STEP * usual && last - before > WRONG * usual =>
-            {
-                self.wrong += 1;
-                Order::AfterWrong(time)
-            }
-            _ => Order::Back(time),
-        }
+        let times: Vec<f64> = self.last.iter().rev().copied().collect();
+        let follows = |wrong: &usize| {
+            let (first, before) = (times[wrong - 1], times[*wrong]);
+            time >= before && time - before <= LONGEST_STEP * usual && first - before > WRONG * usual
+        };
+        let Some(wrong) = (1..times.len()).find(follows) else { return Order::Back(time) };
+        self.wrong += wrong as u64;
+        Order::AfterWrong(time, wrong)
     }
 
     /// Amount of a forward setting with the last row, near the start only.
@@ -95,7 +94,8 @@ impl StampOrder {
         if self.accepted > ROWS_BEFORE_SET {
             return None;
         }
-        let (before, last, usual) = (self.before_last?, self.last?, self.usual()?);
+        let mut times = self.last.iter().rev();
+        let (last, before, usual) = (*times.next()?, *times.next()?, self.usual()?);
         if last - before <= FIRST_WRONG * usual || time - last > LONGEST_STEP * usual {
             return None;
         }
@@ -105,26 +105,28 @@ impl StampOrder {
         }
         self.sets_forward += 1;
         self.offset -= by;
-        self.last = Some(last - by);
+        *self.last.back_mut()? -= by;
         Some(by)
     }
 
     /// Takes the time of a row that is used.
     pub fn accept(&mut self, time: f64) {
-        if let Some(interval) = self.last.map(|last| time - last).filter(|interval| *interval > 0.0) {
+        if let Some(interval) = self.last.back().map(|last| time - last).filter(|interval| *interval > 0.0) {
             if self.intervals.len() == USUAL {
                 self.intervals.pop_front();
             }
             self.intervals.push_back(interval);
         }
-        self.before_last = self.last;
-        self.last = Some(time);
+        if self.last.len() > ROWS_OF_FIRST {
+            self.last.pop_front();
+        }
+        self.last.push_back(time);
         self.accepted += 1;
     }
 
     /// The last row is not used.
     pub fn forget_last(&mut self) {
-        self.last = self.before_last;
+        self.last.pop_back();
         self.intervals.pop_back();
         self.accepted = self.accepted.saturating_sub(1);
     }
@@ -152,7 +154,7 @@ impl StampOrder {
 
     /// A clock set back to `time` before this row: no sample is missing there.
     pub fn set_clock(&mut self, time: f64, row: u64) {
-        let (Some(last), Some(usual)) = (self.last, self.usual()) else { return };
+        let (Some(last), Some(usual)) = (self.last.back(), self.usual()) else { return };
         if self.sets == 0 {
             self.first_set = row;
         }

@@ -154,18 +154,21 @@ fn describe_circles(uses: &Uses, root: &Path) -> String {
     text
 }
 
-/// Sources of the repository, in Rust or Python, that read the variable `ADIS_RECORDINGS`, without the function that
-/// skips a test if a recording is absent.
-fn readers_of_recordings(root: &Path) -> Vec<String> {
-    let output = Command::new("git").args(["ls-files", "-z", "--", "*.rs", "*.py"]).current_dir(root).output();
+/// Names and contents of the files that git tracks and whose names have these patterns.
+fn tracked(root: &Path, patterns: &[&str]) -> Vec<(String, String)> {
+    let output = Command::new("git").args(["ls-files", "-z", "--"]).args(patterns).current_dir(root).output();
     let output = output.expect("git starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let files = String::from_utf8(output.stdout).expect("names in UTF-8");
-    let reads = |file: &&str| {
-        let text = std::fs::read_to_string(root.join(file)).unwrap_or_default();
-        text.contains(&format!("\"{RECORDINGS}\"")) || text.contains(&format!("'{RECORDINGS}'"))
-    };
-    files.split('\0').filter(reads).map(str::to_owned).collect()
+    let read = |file: &str| (file.to_owned(), std::fs::read_to_string(root.join(file)).unwrap_or_default());
+    files.split_terminator('\0').map(read).collect()
+}
+
+/// Sources of the repository, in Rust or Python, that read the variable `ADIS_RECORDINGS`, without the function that
+/// skips a test if a recording is absent.
+fn readers_of_recordings(root: &Path) -> Vec<String> {
+    let reads = |text: &str| text.contains(&format!("\"{RECORDINGS}\"")) || text.contains(&format!("'{RECORDINGS}'"));
+    tracked(root, &["*.rs", "*.py"]).into_iter().filter(|(_, text)| reads(text)).map(|(file, _)| file).collect()
 }
 
 /// Names of public types that are defined more than once, each with its files.
@@ -252,4 +255,14 @@ fn crates_depend_only_on_what_the_design_allows() {
 #[test]
 fn tests_reach_the_measured_recordings_through_the_function_that_skips() {
     assert_eq!(readers_of_recordings(&workspace()), ["tests/src/lib.rs"]);
+}
+
+/// With ticks of 1/32,768 s a pause between two frames may end up to 30.5 us early. Without a feature a tick has a microsecond.
+#[test]
+fn embassy_time_has_ticks_of_a_microsecond() {
+    let manifests = tracked(&workspace(), &["*Cargo.toml"]);
+    let lines = manifests.iter().flat_map(|(file, text)| text.lines().map(move |line| (file, line)));
+    let clocks: Vec<_> = lines.filter(|(_, line)| line.starts_with("embassy-time ")).collect();
+    let is_right = |line: &str| line.matches("tick-hz-").count() == line.matches("\"tick-hz-1_000_000\"").count();
+    assert!(clocks.len() >= 3 && clocks.iter().all(|(_, line)| is_right(line)), "{clocks:#?}");
 }

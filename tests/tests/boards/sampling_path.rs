@@ -138,7 +138,7 @@ fn the_main_loop_has_panics() {
 }
 
 /// The functions that run while the Pico's flash executes commands.
-const IN_RAM: [&str; 3] = ["read_unique_id", "erase_sector", "program_page"];
+const IN_RAM: [&str; 1] = ["operate_flash"];
 /// Addresses of the flash.
 const FLASH: Range<u32> = 0x1000_0000..0x1100_0000;
 

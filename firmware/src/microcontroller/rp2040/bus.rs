@@ -1,7 +1,7 @@
 //! SPI0 with two DMA channels, for the sensor.
 
 use super::start::Rp2040;
-use crate::bus_frame::{BusFault, ByteExchange, wait_for};
+use crate::bus_frame::{BusFault, ByteExchange, flag_in_time, wait_for};
 use crate::microcontroller::sensor_spi::SpiPeripheral;
 use rp2040_hal::fugit::{HertzU32, RateExtU32};
 use rp2040_hal::pac::{self, DMA, RESETS, SPI0};
@@ -119,20 +119,15 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
 impl<W: ValidSpiPinout<SPI0>> ByteExchange for Spi0<W> {
     fn exchange(&mut self, byte: u8) -> Result<u8, BusFault> {
         let spi = registers();
-        if !wait_for(|| spi.sspsr().read().tnf().bit_is_set()) {
-            return Err(BusFault::Timeout);
-        }
+        flag_in_time(|| spi.sspsr().read().tnf().bit_is_set())?;
         // SAFETY: the register takes any 16 bits.
         spi.sspdr().write(|w| unsafe { w.data().bits(u16::from(byte)) });
-        if !wait_for(|| spi.sspsr().read().rne().bit_is_set()) {
-            return Err(BusFault::Timeout);
-        }
+        flag_in_time(|| spi.sspsr().read().rne().bit_is_set())?;
         let received = spi.sspdr().read().data().bits() as u8;
         if spi.sspris().read().rorris().bit_is_set() { Err(BusFault::Overrun) } else { Ok(received) }
     }
 
     fn finish(&mut self) -> Result<(), BusFault> {
-        let idle = wait_for(|| registers().sspsr().read().bsy().bit_is_clear());
-        if idle { Ok(()) } else { Err(BusFault::Timeout) }
+        flag_in_time(|| registers().sspsr().read().bsy().bit_is_clear())
     }
 }

@@ -12,8 +12,16 @@ const UNIQUE_ID_BYTES: usize = 8;
 const READ_UNIQUE_ID: u32 = 0x4B;
 const DUMMY_BYTES: usize = 4;
 
+#[derive(Clone, Copy)]
+enum Operation {
+    ReadUniqueId,
+    EraseSector,
+    ProgramPage,
+}
+
 #[repr(C)]
 struct Command {
+    operation: Operation,
     connect_internal_flash: unsafe extern "C" fn(),
     flash_exit_xip: unsafe extern "C" fn(),
     flash_flush_cache: unsafe extern "C" fn(),
@@ -25,11 +33,11 @@ struct Command {
     data: *mut u8,
 }
 
-/// Runs `function`, which must lie in RAM.
-fn run(function: unsafe extern "C" fn(&Command), offset: u32, data: *mut u8) {
+fn run(operation: Operation, offset: u32, data: *mut u8) {
     // SAFETY: flash, which is readable here.
     let boot2: [u32; BOOT2_WORDS] = core::array::from_fn(|word| unsafe { FLASH.add(word).read_volatile() });
     let command = Command {
+        operation,
         connect_internal_flash: rom_data::connect_internal_flash::ptr(),
         flash_exit_xip: rom_data::flash_exit_xip::ptr(),
         flash_flush_cache: rom_data::flash_flush_cache::ptr(),
@@ -43,7 +51,7 @@ fn run(function: unsafe extern "C" fn(&Command), offset: u32, data: *mut u8) {
     cortex_m::interrupt::free(|_| {
         compiler_fence(Ordering::SeqCst);
         // SAFETY: no interrupt, no second core and no DMA transfer reads the flash meanwhile.
-        unsafe { function(&command) };
+        unsafe { operate_flash(&command) };
         compiler_fence(Ordering::SeqCst);
     });
     core::hint::black_box(&boot2);
@@ -52,7 +60,7 @@ fn run(function: unsafe extern "C" fn(&Command), offset: u32, data: *mut u8) {
 /// Unique number of flash and board; no DMA transfer may run.
 pub fn unique_id() -> [u8; UNIQUE_ID_BYTES] {
     let mut id = [0; UNIQUE_ID_BYTES];
-    run(read_unique_id, 0, id.as_mut_ptr());
+    run(Operation::ReadUniqueId, 0, id.as_mut_ptr());
     id
 }
 
@@ -68,13 +76,37 @@ const EEPROM_READ: u32 = 3 << 8;
 /// RFNE of SR: a byte was received.
 const RECEIVED: u32 = 1 << 3;
 
+const SECTOR: usize = 4096;
+const PAGE: usize = 256;
+/// Instruction that erases a sector; the boot ROM takes it as the instruction that erases a block.
+const ERASE_SECTOR: u8 = 0x20;
+
+/// Carries out a command, in RAM.
 #[inline(never)]
-#[unsafe(link_section = ".data.read_unique_id")]
-unsafe extern "C" fn read_unique_id(command: &Command) {
-    // SAFETY: the caller has seen to it that nothing else uses the flash; the registers are those of the SSI, and `data` has room.
+#[unsafe(link_section = ".data.operate_flash")]
+unsafe extern "C" fn operate_flash(command: &Command) {
+    // SAFETY: the caller has seen to it that nothing else uses the flash, and has checked the offset; `data` has room for the operation.
     unsafe {
         (command.connect_internal_flash)();
         (command.flash_exit_xip)();
+        match command.operation {
+            Operation::ReadUniqueId => read_unique_id(command.data),
+            Operation::EraseSector => (command.flash_range_erase)(command.offset, SECTOR, SECTOR as u32, ERASE_SECTOR),
+            Operation::ProgramPage => (command.flash_range_program)(command.offset, command.data, PAGE),
+        }
+        (command.flash_flush_cache)();
+        (command.boot2)();
+    }
+}
+
+/// Part of [`operate_flash`], in RAM as it is.
+///
+/// # Safety
+/// Nothing else uses the flash, and `id` has room for the number.
+#[inline(always)]
+unsafe fn read_unique_id(id: *mut u8) {
+    // SAFETY: the registers are those of the SSI.
+    unsafe {
         SSI.add(SSIENR).write_volatile(0);
         SSI.add(CTRLR0).write_volatile(SSI.add(CTRLR0).read_volatile() | EEPROM_READ);
         SSI.add(CTRLR1).write_volatile((DUMMY_BYTES + UNIQUE_ID_BYTES - 1) as u32);
@@ -86,45 +118,12 @@ unsafe extern "C" fn read_unique_id(command: &Command) {
             while SSI.add(SR).read_volatile() & RECEIVED == 0 {}
             let byte = SSI.add(DR0).read_volatile() as u8;
             if index >= DUMMY_BYTES {
-                command.data.add(index - DUMMY_BYTES).write_volatile(byte);
+                id.add(index - DUMMY_BYTES).write_volatile(byte);
             }
             index += 1;
         }
         SSI.add(SSIENR).write_volatile(0);
         SSI.add(CTRLR1).write_volatile(0);
-        (command.flash_flush_cache)();
-        (command.boot2)();
-    }
-}
-
-const SECTOR: usize = 4096;
-const PAGE: usize = 256;
-/// Instruction that erases a sector; the boot ROM takes it as the instruction that erases a block.
-const ERASE_SECTOR: u8 = 0x20;
-
-#[inline(never)]
-#[unsafe(link_section = ".data.erase_sector")]
-unsafe extern "C" fn erase_sector(command: &Command) {
-    // SAFETY: as in `read_unique_id`; the caller has checked the offset.
-    unsafe {
-        (command.connect_internal_flash)();
-        (command.flash_exit_xip)();
-        (command.flash_range_erase)(command.offset, SECTOR, SECTOR as u32, ERASE_SECTOR);
-        (command.flash_flush_cache)();
-        (command.boot2)();
-    }
-}
-
-#[inline(never)]
-#[unsafe(link_section = ".data.program_page")]
-unsafe extern "C" fn program_page(command: &Command) {
-    // SAFETY: as in `read_unique_id`; the caller has checked the offset, and `data` has a page.
-    unsafe {
-        (command.connect_internal_flash)();
-        (command.flash_exit_xip)();
-        (command.flash_range_program)(command.offset, command.data, PAGE);
-        (command.flash_flush_cache)();
-        (command.boot2)();
     }
 }
 
@@ -137,7 +136,7 @@ impl FlashMemory for Rp2040Flash {
     const SECTOR: usize = SECTOR;
 
     fn erase(offset: u32) -> Result<(), FlashError> {
-        run(erase_sector, offset, core::ptr::null_mut());
+        run(Operation::EraseSector, offset, core::ptr::null_mut());
         Ok(())
     }
 
@@ -149,7 +148,7 @@ impl FlashMemory for Rp2040Flash {
             let (now, later) = rest.split_at(rest.len().min(PAGE - begin));
             let mut contents = [0xFF; PAGE];
             contents[begin..begin + now.len()].copy_from_slice(now);
-            run(program_page, page as u32, contents.as_mut_ptr());
+            run(Operation::ProgramPage, page as u32, contents.as_mut_ptr());
             (at, rest) = (page + PAGE, later);
         }
         Ok(())

@@ -4,13 +4,13 @@ use super::flash::Rp2040Flash;
 use super::usb::Rp2040UsbPort;
 use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
-use crate::microcontroller::{DataReadyPin, Microcontroller};
+use crate::microcontroller::{DataReadyPin, Microcontroller, first_cause};
 use crate::watchdog::{Watchdog, WatchdogExtension};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use embedded_hal::digital::{InputPin, StatefulOutputPin};
 use link::BootCause;
 use rp2040_hal::Timer;
-use rp2040_hal::clocks::{ClocksManager, InitError, init_clocks_and_plls};
+use rp2040_hal::clocks::{ClocksManager, init_clocks_and_plls};
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::{DynPinId, FunctionSioInput, FunctionSioOutput, Interrupt, Pin, PinId, PullDown};
 use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
@@ -32,48 +32,37 @@ const ALARM_CYCLES: u32 = 400_000;
 const BROWN_OUT_LEVEL: u8 = 0b1011;
 
 /// Reads the cause of the start (RP2040 data sheet, sections 2.10.6.2 and 4.7.6).
-pub fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> BootCause {
+pub(super) fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> BootCause {
     let (reason, chip) = (watchdog.reason().read(), chip.chip_reset().read());
     // The chip's flags do not show a watchdog reset; power-on and brown-out share one flag.
-    if reason.timer().bit_is_set() {
-        BootCause::Watchdog
-    } else if reason.force().bit_is_set() {
-        BootCause::Software
-    } else if chip.had_por().bit_is_set() {
-        BootCause::PowerOn
-    } else if chip.had_run().bit_is_set() {
-        BootCause::Pin
-    } else {
-        BootCause::Unknown
-    }
+    let causes = [
+        (reason.timer().bit_is_set(), BootCause::Watchdog),
+        (reason.force().bit_is_set(), BootCause::Software),
+        (chip.had_por().bit_is_set(), BootCause::PowerOn),
+        (chip.had_run().bit_is_set(), BootCause::Pin),
+    ];
+    first_cause(causes)
 }
 
 /// An RP2040 with running clock and watchdog.
 pub struct Rp2040;
 
 /// The peripherals from which the clocks are made.
-pub struct ClockParts {
-    /// Crystal oscillator.
-    pub crystal: XOSC,
-    /// Clocks.
-    pub clocks: CLOCKS,
-    /// Their two PLLs.
-    pub plls: (PLL_SYS, PLL_USB),
-    /// Timer.
-    pub timer: TIMER,
+pub(super) struct ClockParts {
+    pub(super) crystal: XOSC,
+    pub(super) clocks: CLOCKS,
+    pub(super) plls: (PLL_SYS, PLL_USB),
+    pub(super) timer: TIMER,
 }
 
 impl Rp2040 {
     /// Starts the watchdog first, then clocks and microsecond counter. Without the crystal the LED blinks fast.
-    ///
-    /// # Errors
-    /// The crystal's frequency makes no clock.
-    pub fn start(
+    pub(super) fn start(
         parts: ClockParts,
         (watchdog, chip): (WATCHDOG, &VREG_AND_CHIP_RESET),
         resets: &mut RESETS,
         led: &mut impl StatefulOutputPin,
-    ) -> Result<ClocksManager, InitError> {
+    ) -> ClocksManager {
         let mut watchdog = rp2040_hal::Watchdog::new(watchdog);
         // Until the crystal runs, the ring oscillator clocks the watchdog: 5.7 s or more.
         watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
@@ -93,9 +82,10 @@ impl Rp2040 {
             Self::restart();
         }
         let ClockParts { crystal, clocks, plls, timer } = parts;
-        let clocks = init_clocks_and_plls(CRYSTAL_HZ, crystal, clocks, plls.0, plls.1, resets, &mut watchdog)?;
+        let clocks = init_clocks_and_plls(CRYSTAL_HZ, crystal, clocks, plls.0, plls.1, resets, &mut watchdog);
+        let Ok(clocks) = clocks else { panic!("the clocks do not start") };
         let _timer_runs_on = Timer::new(timer, resets, &clocks);
-        Ok(clocks)
+        clocks
     }
 }
 

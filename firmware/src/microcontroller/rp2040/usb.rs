@@ -2,7 +2,7 @@
 
 use super::flash::unique_id;
 use crate::bus_frame::wait_for;
-use crate::microcontroller::UsbParts;
+use crate::microcontroller::{UsbParts, start_usb};
 use crate::usb_port::UsbPort;
 use rp2040_hal::clocks::UsbClock;
 use rp2040_hal::pac::{RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
@@ -24,7 +24,7 @@ pub fn usb_port(
 ) -> Option<UsbParts<Rp2040UsbPort>> {
     let bus = UsbBus::new(registers, memory, clock, true, resets);
     let bus = cortex_m::singleton!(USB_BUS: UsbBusAllocator<UsbBus> = UsbBusAllocator::new(bus))?;
-    UsbParts::start(bus, PRODUCT_ID, unique_id(), reconnect)
+    start_usb(bus, PRODUCT_ID, unique_id(), reconnect)
 }
 
 /// Takes the controller off the bus, or starts it as [`UsbBus::new`] does; endpoints and address follow a bus reset.

@@ -62,9 +62,7 @@ where
         timer: device.TIMER,
     };
     let supervision = (device.WATCHDOG, &device.VREG_AND_CHIP_RESET);
-    let Ok(clocks) = Rp2040::start(parts, supervision, &mut resets, &mut led) else {
-        panic!("the clocks do not start");
-    };
+    let clocks = Rp2040::start(parts, supervision, &mut resets, &mut led);
     let (peripheral, core_hz) = (clocks.peripheral_clock.freq(), clocks.system_clock.freq().to_Hz());
 
     let settings = uart::UartConfig::new(BAUD.Hz(), uart::DataBits::Eight, None, uart::StopBits::One);

@@ -1,7 +1,7 @@
 //! SPI1 with two streams of DMA2, for the sensor.
 
 use super::start::Stm32f4;
-use crate::bus_frame::{BusFault, ByteExchange, wait_for};
+use crate::bus_frame::{BusFault, ByteExchange, flag_in_time, wait_for};
 use crate::microcontroller::sensor_spi::{SensorSpi, SpiPeripheral};
 use crate::sensor::{BURST_LIMIT_HZ, prescaled_clock};
 use stm32f4xx_hal::gpio::{Output, PA4, PA5, PA6, PA7, PinState, Pull, Speed};
@@ -134,19 +134,14 @@ impl SpiPeripheral for Spi1 {
 impl ByteExchange for Spi1 {
     fn exchange(&mut self, byte: u8) -> Result<u8, BusFault> {
         let spi = registers();
-        if !wait_for(|| spi.sr().read().txe().bit_is_set()) {
-            return Err(BusFault::Timeout);
-        }
+        flag_in_time(|| spi.sr().read().txe().bit_is_set())?;
         spi.dr().write(|w| w.dr().set(u16::from(byte)));
-        if !wait_for(|| spi.sr().read().rxne().bit_is_set()) {
-            return Err(BusFault::Timeout);
-        }
+        flag_in_time(|| spi.sr().read().rxne().bit_is_set())?;
         let received = spi.dr().read().dr().bits() as u8;
         if spi.sr().read().ovr().bit_is_set() { Err(BusFault::Overrun) } else { Ok(received) }
     }
 
     fn finish(&mut self) -> Result<(), BusFault> {
-        let idle = wait_for(|| registers().sr().read().bsy().bit_is_clear());
-        if idle { Ok(()) } else { Err(BusFault::Timeout) }
+        flag_in_time(|| registers().sr().read().bsy().bit_is_clear())
     }
 }

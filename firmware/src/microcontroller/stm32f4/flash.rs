@@ -13,6 +13,8 @@ const PSIZE_32: u8 = 0b10;
 const SECTORS_BEFORE: usize = 4;
 /// Keys that unlock FLASH_CR (section 3.6.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// OPERR, WRPERR, PGAERR, PGPERR and PGSERR of FLASH_SR (section 3.9.4).
+const ERRORS: u32 = 0b1111_0010;
 /// Number of waits of 0.4 ms; a sector takes 2 s, a word 0.1 ms (STM32F405 data sheet, flash memory programming).
 const WAITS: u32 = 10_000;
 
@@ -61,7 +63,7 @@ fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> 
     }
     // SAFETY: flags, each cleared by a one.
     flash.sr().modify(|r, w| unsafe { w.bits(r.bits()) });
-    let done = if flash.cr().read().lock().bit_is_clear() { operation(flash) } else { Err(FlashError::Refused) };
+    let done = if flash.cr().read().lock().bit_is_clear() { operation(flash) } else { Err(FlashError::Other) };
     flash.cr().modify(|_, w| w.ser().clear_bit().pg().clear_bit().lock().set_bit());
     // The data cache is stale (section 3.5.2); it must be off while it is emptied.
     flash.acr().modify(|_, w| w.dcen().clear_bit());
@@ -73,13 +75,5 @@ fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> 
 
 fn finish(flash: &RegisterBlock) -> Result<(), FlashError> {
     let is_ready = (0..WAITS).any(|_| wait_for(|| flash.sr().read().bsy().bit_is_clear()));
-    let status = flash.sr().read();
-    let errors = [
-        status.operr().bit_is_set(),
-        status.wrperr().bit_is_set(),
-        status.pgaerr().bit_is_set(),
-        status.pgperr().bit_is_set(),
-        status.pgserr().bit_is_set(),
-    ];
-    if is_ready && !errors.contains(&true) { Ok(()) } else { Err(FlashError::Refused) }
+    if is_ready && flash.sr().read().bits() & ERRORS == 0 { Ok(()) } else { Err(FlashError::Other) }
 }

@@ -4,7 +4,7 @@ use super::flash::Stm32Flash;
 use super::watchdog;
 use crate::board::BrownOutLevel;
 use crate::bus_frame::{MicrosecondCounter, wait_for};
-use crate::microcontroller::Microcontroller;
+use crate::microcontroller::{Microcontroller, first_cause};
 use crate::watchdog::Watchdog;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::{NVIC, SCB};
@@ -29,23 +29,18 @@ const BROWN_OUT_LEVEL_3: u8 = 0b00;
 const OPTION_KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
 
 /// Reads the cause of the start and clears the reset flags (RM0090 section 6.3.21).
-pub fn boot_cause(rcc: &RCC) -> BootCause {
+fn boot_cause(rcc: &RCC) -> BootCause {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     // Power-on also sets the brown-out flag, and every reset the flag of the pin.
-    if flags.porrstf().bit_is_set() {
-        BootCause::PowerOn
-    } else if flags.wdgrstf().bit_is_set() {
-        BootCause::Watchdog
-    } else if flags.sftrstf().bit_is_set() {
-        BootCause::Software
-    } else if flags.borrstf().bit_is_set() {
-        BootCause::BrownOut
-    } else if flags.padrstf().bit_is_set() {
-        BootCause::Pin
-    } else {
-        BootCause::Unknown
-    }
+    let causes = [
+        (flags.porrstf().bit_is_set(), BootCause::PowerOn),
+        (flags.wdgrstf().bit_is_set(), BootCause::Watchdog),
+        (flags.sftrstf().bit_is_set(), BootCause::Software),
+        (flags.borrstf().bit_is_set(), BootCause::BrownOut),
+        (flags.padrstf().bit_is_set(), BootCause::Pin),
+    ];
+    first_cause(causes)
 }
 
 /// An STM32F4 with running clock and watchdog.
@@ -59,10 +54,8 @@ impl Watchdog for Stm32f4 {
 
 /// The result of a start.
 pub struct Started {
-    /// Reason for which the microcontroller started.
-    pub cause: BootCause,
-    /// The source of the clocks.
-    pub clock: ClockSource,
+    pub(super) cause: BootCause,
+    pub(super) clock: ClockSource,
     /// The clocks.
     pub rcc: Rcc,
 }

@@ -1,6 +1,6 @@
 //! The USB port of an STM32F405: its full-speed controller (OTG_FS), as a device.
 
-use crate::microcontroller::UsbParts;
+use crate::microcontroller::{UsbParts, start_usb};
 use crate::usb_port::UsbPort;
 use stm32f4xx_hal::gpio::alt::otg_fs::{Dm, Dp};
 use stm32f4xx_hal::otg_fs::{USB, UsbBus};
@@ -30,7 +30,7 @@ pub fn usb_port(
     let bus = cortex_m::singleton!(USB_BUS: UsbBusAllocator<UsbBus<USB>> = bus)?;
     // SAFETY: read-only memory.
     let unique_id = unsafe { UNIQUE_ID.read_volatile() };
-    UsbParts::start(bus, PRODUCT_ID, unique_id.into_iter().flat_map(u32::to_be_bytes), reconnect)
+    start_usb(bus, PRODUCT_ID, unique_id.into_iter().flat_map(u32::to_be_bytes), reconnect)
 }
 
 /// Sets or clears SDIS (RM0090 section 34.16.4); the host then resets the bus.

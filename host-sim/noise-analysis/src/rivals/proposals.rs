@@ -3,7 +3,7 @@
 
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
-use crate::detectors::random_telegraph::{self, is_reversible};
+use crate::detectors::random_telegraph::{Law, is_reversible};
 use crate::effects::findings::{REFUTED, TOLD_APART};
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, LineEvidence,
@@ -174,18 +174,25 @@ fn markov_effects(
         if of.ratio - 3.0 * of.error > LARGEST_KURTOSIS_RATIO {
             effects.push(unexplained(Refutation::RareDisturbances { time_constant_s, kurtosis }));
         } else if of.is_telegraph() {
-            effects.push(telegraph_effect(term, &of, curve, unit));
-        } else if !is_gaussian(&of) && !are_samples_gaussian(findings, term, markov) {
-            effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis }));
+            // Two levels that are equally frequent are two standard deviations apart.
+            let evidence = TelegraphEvidence::Kurtosis { ratio: of.ratio, error: of.error, curve };
+            effects.push(telegraph_effect(term, 2.0, evidence, unit));
+        } else if !is_gaussian(&of) {
+            match law_by_samples(findings, term, markov) {
+                Some(Law::Gaussian) => {}
+                Some(Law::TwoLevels { jumps, gain, distance }) => {
+                    effects.push(telegraph_effect(term, distance, TelegraphEvidence::Levels { jumps, gain }, unit));
+                }
+                None => effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis })),
+            }
         }
     }
     effects
 }
 
-/// True if the samples of a channel, without its sinusoids, say that a Markov term of its model is a Gaussian process and no two levels. They
-/// do not if anything else in them is correlated for longer than a filter's response: a band or a second process is nearer to a Gaussian
-/// process than to levels.
-fn are_samples_gaussian(findings: &ChannelFindings, term: &FittedTerm, markov: Markov) -> bool {
+/// The law of a Markov term of the model of a channel, by the samples without their sinusoids. They do not tell it if anything else in them is
+/// correlated for longer than a filter's response: a band or a second process is nearer to a Gaussian process than to levels.
+fn law_by_samples(findings: &ChannelFindings, term: &FittedTerm, markov: Markov) -> Option<Law> {
     let model = findings.fit.after();
     let is_known = |other: &FittedTerm| {
         let is_sinusoid = matches!(other.kind, NoiseTerm::Sinusoid(_));
@@ -193,11 +200,10 @@ fn are_samples_gaussian(findings: &ChannelFindings, term: &FittedTerm, markov: M
     };
     let lines = findings.lines.unwrap_or_default();
     if !model.terms().iter().all(is_known) || !lines.iter().all(MergedLine::is_sinusoid) {
-        return false;
+        return None;
     }
-    let Some(rest) = findings.rest else { return false };
-    let rest = without_sines_at(rest, lines.iter().map(|line| line.frequency.value));
-    random_telegraph::is_gaussian(&rest, term.value, markov.time_constant, filter_length_s(model))
+    let rest = without_sines_at(findings.rest?, lines.iter().map(|line| line.frequency.value));
+    Law::of_process(&rest, term.value, markov.time_constant, filter_length_s(model))
 }
 
 /// True if a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
@@ -282,15 +288,10 @@ fn filter_effect(
     .into()
 }
 
-/// A Markov term whose kurtosis is that of random telegraph noise.
-fn telegraph_effect(term: &FittedTerm, kurtosis: &KurtosisRatio, curve: CurveEvidence, unit: &'static str) -> Effect {
-    TelegraphNoise {
-        time_constant_s: shape(term, 0),
-        // Two levels that are equally frequent are two standard deviations apart.
-        amplitude: coefficient(term, unit).scaled(2.0),
-        evidence: TelegraphEvidence::Kurtosis { ratio: kurtosis.ratio, error: kurtosis.error, curve },
-    }
-    .into()
+/// A Markov term that is random telegraph noise, with levels `distance` standard deviations apart.
+fn telegraph_effect(term: &FittedTerm, distance: f64, evidence: TelegraphEvidence, unit: &'static str) -> Effect {
+    let amplitude = coefficient(term, unit).scaled(distance);
+    TelegraphNoise { time_constant_s: shape(term, 0), amplitude, evidence }.into()
 }
 
 /// A term that fits an octave of the curve and is contradicted.

@@ -74,6 +74,7 @@ fn ambiguous(channel: &str, one: &str, other: &str) -> SelectionError {
 pub struct ColumnSelection {
     assignments: Vec<(String, String)>,
     units: Vec<Unit>,
+    has_no_time: bool,
 }
 
 impl ColumnSelection {
@@ -101,7 +102,13 @@ impl ColumnSelection {
             }
             known.push(unit);
         }
-        Ok(Self { assignments, units: known })
+        Ok(Self { assignments, units: known, has_no_time: false })
+    }
+
+    /// The same, without a column of times.
+    #[must_use]
+    pub fn without_time(self) -> Self {
+        Self { has_no_time: true, ..self }
     }
 
     /// True if nothing is stated.
@@ -155,6 +162,7 @@ impl ColumnSelection {
             }
             assigned
         };
+        chosen.retain(|(role, _)| *role != Role::Time || !self.has_no_time);
         if !chosen.iter().any(|(role, _)| matches!(role, Role::Channel(_))) {
             return Err(SelectionError::NoChannel(names(available)));
         }
@@ -200,7 +208,8 @@ impl ColumnSelection {
         chosen: &[ChosenColumn],
         sensor: &SensorProfile,
     ) -> Vec<String> {
-        let is_used = |at: &usize| chosen.iter().any(|column| column.position == *at);
+        // Positions may be those of a whole row.
+        let is_used = |at: &usize| chosen.iter().any(|column| column.label == available[*at].name);
         if !self.assignments.is_empty() {
             let others = available.iter().enumerate().filter(|(at, _)| !is_used(at));
             let others: Vec<&str> = others.map(|(_, column)| column.name.as_str()).collect();
@@ -210,7 +219,9 @@ impl ColumnSelection {
         let named = by_name(available, sensor).unwrap_or_default();
         let unitless = self.unitless_companions(&named, available);
         let (mut no_channel, mut other_unit) = (Vec::new(), Vec::new());
-        for (_, column) in available.iter().enumerate().filter(|(at, _)| !is_used(at) && !unitless.contains(at)) {
+        let is_ignored = |at: &usize| self.has_no_time && named.contains(&(Role::Time, *at));
+        let is_left_out = |at: &usize| !is_used(at) && !unitless.contains(at) && !is_ignored(at);
+        for (_, column) in available.iter().enumerate().filter(|(at, _)| is_left_out(at)) {
             match (sensor.channel(&column.name).or_else(|| column.channel(sensor)), column.unit) {
                 (Some(_), Some(unit)) => other_unit.push(format!("{} in {}", column.name, unit.name)),
                 _ => no_channel.push(column.name.as_str()),
@@ -230,6 +241,14 @@ impl ColumnSelection {
         }
         if !no_channel.is_empty() {
             notes.push(format!("{} left out: no known name of a channel; --columns reads it", listed(&no_channel)));
+        }
+        let has_no_name = |column: &&ChosenColumn| {
+            let position = available.iter().position(|of| of.name == column.label);
+            position.is_some_and(|position| role_by_name(available, position, sensor).is_none())
+        };
+        let by_unit: Vec<&str> = chosen.iter().filter(has_no_name).map(|column| column.label.as_str()).collect();
+        if !by_unit.is_empty() {
+            notes.push(format!("{} are axes of a sensor by their unit; --columns says otherwise", listed(&by_unit)));
         }
         let by_interface = chosen.iter().filter(|column| self.unit_of_interface(column).is_some());
         let by_interface: Vec<&str> = by_interface.map(|column| column.label.as_str()).collect();
@@ -458,17 +477,21 @@ pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'stat
     Some(named.into_iter().map(|(role, position)| (role.name(), position)).collect())
 }
 
+fn role_by_name(available: &[AvailableColumn], position: usize, sensor: &SensorProfile) -> Option<Role> {
+    let name = &available[position].name;
+    let by_name = || match role_of(&numbered_from_1(available, name).unwrap_or_else(|| name.clone()))? {
+        NamedRole::Time => Some(Role::Time),
+        NamedRole::Index => Some(Role::Index),
+        NamedRole::Channel(name) => sensor.channel(name).map(Role::Channel),
+    };
+    let of_body = || rate_of_body(available, position).and_then(|name| sensor.channel(name)).map(Role::Channel);
+    sensor.channel(name).map(Role::Channel).or_else(by_name).or_else(of_body)
+}
+
 fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<(Role, usize)>, SelectionError> {
     let mut named: Vec<(Role, usize)> = Vec::new();
     for (position, column) in available.iter().enumerate() {
-        let own = sensor.channel(&column.name).map(Role::Channel);
-        let of_body = || rate_of_body(available, position).and_then(|name| sensor.channel(name)).map(Role::Channel);
-        let by_name = || match role_of(&column.name)? {
-            NamedRole::Time => Some(Role::Time),
-            NamedRole::Index => Some(Role::Index),
-            NamedRole::Channel(name) => sensor.channel(name).map(Role::Channel),
-        };
-        let role = own.or_else(by_name).or_else(of_body).filter(|role| match role {
+        let role = role_by_name(available, position, sensor).filter(|role| match role {
             Role::Channel(profile) => column.may_measure(profile),
             Role::Time | Role::Index => true,
         });
@@ -489,7 +512,30 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
         }
         named.push((role, position));
     }
+    for (axes, quantity) in AXES.into_iter().zip([Quantity::AngularRate, Quantity::SpecificForce]) {
+        if !named.iter().any(|(role, _)| matches!(role, Role::Channel(known) if known.quantity == quantity)) {
+            let profiles = axes.map(|name| sensor.channel(name));
+            let by_unit = axes_by_unit(available, quantity).into_iter().flatten().zip(profiles);
+            named.extend(by_unit.filter_map(|(at, profile)| Some((Role::Channel(profile?), at))));
+        }
+    }
     Ok(named)
+}
+
+/// The only three columns in a unit of `quantity`, by the x, y and z at the end of their names.
+fn axes_by_unit(available: &[AvailableColumn], quantity: Quantity) -> Option<[usize; 3]> {
+    let of_unit = |column: &AvailableColumn| column.unit.is_some_and(|unit| unit.measures(quantity));
+    let own: Vec<usize> = (0..available.len()).filter(|at| of_unit(&available[*at])).collect();
+    let axis = |letter: char| own.iter().copied().find(|at| available[*at].name.to_lowercase().ends_with(letter));
+    Some([axis('x')?, axis('y')?, axis('z')?]).filter(|_| own.len() == 3)
+}
+
+/// The name with the number from 0, if there are the numbers 1, 2 and 3 but not 0.
+fn numbered_from_1(available: &[AvailableColumn], name: &str) -> Option<String> {
+    let (base, number) = name.split_at_checked(name.len().checked_sub(1)?)?;
+    let has = |number: &str| available.iter().any(|other| other.name.strip_suffix(number) == Some(base));
+    let from_1: u8 = number.parse().ok().filter(|number| (1..=3).contains(number))?;
+    (["1", "2", "3"].into_iter().all(has) && !has("0")).then(|| format!("{base}{}", from_1 - 1))
 }
 
 /// p, q and r of aviation, if all three are there.
@@ -672,6 +718,29 @@ mod tests {
         for headings in [&["t_s", "p", "r"][..], &["t_s", "w_x [uT]"], &["latitude", "quality"]] {
             assert!(matches!(chosen(headings, &[], &["deg/s"]), Err(SelectionError::NoChannel(_))), "{headings:?}");
         }
+    }
+
+    #[test]
+    fn axes_are_told_by_their_unit_or_their_number() {
+        let by_unit = ["t [s]", "ω_x [rad/s]", "ω_y [rad/s]", "ω_z [rad/s]", "fX (m/s^2)", "fY (m/s^2)", "fZ (m/s^2)"];
+        let from_1 = ["t [s]", "gyro1", "gyro2", "gyro3", "acc1", "acc2", "acc3"];
+        let from_0 = ["t [s]", "gyro0", "gyro1", "gyro2", "gyro3", "acc0", "acc1", "acc2"];
+        let all = ["time s", "gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"];
+        for (headings, places) in [(&by_unit[..], [0, 1, 2, 3, 4, 5, 6]), (&from_1, [0, 1, 2, 3, 4, 5, 6])] {
+            let found = chosen(headings, &[], &["rad/s", "m/s^2"]).expect("columns");
+            let expected: Vec<String> = all.iter().zip(places).map(|(name, at)| format!("{name}={at}")).collect();
+            assert_eq!(found.into_iter().map(|(name, _)| name).collect::<Vec<_>>(), expected);
+        }
+        let found = chosen(&from_0, &[], &["rad/s", "m/s^2"]).expect("columns");
+        assert_eq!(found[1].0, "gyro_x=1");
+        // Four of one unit are no axes.
+        let four = [&by_unit[..4], &["speed [rad/s]"]].concat();
+        assert!(matches!(chosen(&four, &[], &[]), Err(SelectionError::NoChannel(_))));
+        let available: Vec<AvailableColumn> = by_unit.iter().map(|text| AvailableColumn::from_heading(text)).collect();
+        let (selection, sensor) = (ColumnSelection::default(), SensorProfile::generic());
+        let chosen = selection.choose(&available, &sensor).expect("columns");
+        let expected = "ω_x, ω_y, ω_z, fX, fY, fZ are axes of a sensor by their unit; --columns says otherwise";
+        assert_eq!(selection.notes(&available, &chosen, &sensor), [expected]);
     }
 
     #[test]

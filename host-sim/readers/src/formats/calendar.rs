@@ -16,13 +16,52 @@ pub(crate) fn date_time(text: &str) -> Option<i64> {
 }
 
 fn date_time_with(text: &str, date: impl FnOnce(&str) -> Option<i64>) -> Option<i64> {
-    let at = text.find(|c: char| c == 'T' || c == 't' || c.is_ascii_whitespace())?;
+    let may_be_words = text.bytes().filter(|byte| *byte == b' ').count() > 1;
+    if let Some((date, clock)) = may_be_words.then(|| with_named_month(text)).flatten() {
+        return date.days(Order::MonthFirst)?.checked_mul(DAY_NS)?.checked_add(time_of_day(&clock)?);
+    }
+    let at = text.find(|c: char| matches!(c, 'T' | 't' | '_') || c.is_ascii_whitespace())?;
     let (first, rest) = (&text[..at], text[at + 1..].trim_start());
+    // 20180425T100013.5, 2018-04-25_10-00-13.5.
+    let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+    if digits == 6 && first.len() == 8 && first.bytes().all(|byte| byte.is_ascii_digit()) {
+        let clock = format!("{}:{}:{}", &rest[..2], &rest[2..4], &rest[4..]);
+        let date = date(&format!("{}-{}-{}", &first[..4], &first[4..6], &first[6..]))?;
+        return date.checked_mul(DAY_NS)?.checked_add(time_of_day(&clock)?);
+    }
+    if digits == 2 && rest.matches('-').count() == 2 && !rest.contains(':') {
+        return date(first)?.checked_mul(DAY_NS)?.checked_add(time_of_day(&rest.replace('-', ":"))?);
+    }
     if let Some(clock) = rest.strip_prefix("days ").or_else(|| rest.strip_prefix("day ")) {
         let days: i64 = first.parse().ok()?;
         return days.checked_mul(DAY_NS)?.checked_add(time_of_day(clock.trim_start().trim_start_matches('+'))?);
     }
     date(first)?.checked_mul(DAY_NS)?.checked_add(time_of_day(rest)?)
+}
+
+/// Date and time of day of words between blanks: `Apr 25, 2018 10:00:13`, `Wed Apr 25 10:00:13 2018`, `25 Apr 2018 10:00`.
+fn with_named_month(text: &str) -> Option<(WrittenDate, String)> {
+    let (mut year, mut month, mut day, mut clock) = (None, None, None, String::new());
+    for word in text.split([' ', ',']).filter(|word| !word.is_empty()) {
+        let is_number = word.bytes().all(|byte| byte.is_ascii_digit());
+        match word.len() {
+            4 if is_number => year = word.parse().ok(),
+            1 | 2 if is_number => day = word.parse().ok(),
+            // AM, PM or an offset follow the clock.
+            _ if !clock.is_empty() => clock = format!("{clock} {word}"),
+            _ if word.contains(':') => word.clone_into(&mut clock),
+            _ => month = month.or_else(|| month_of(word)),
+        }
+    }
+    let date = WrittenDate { year: year?, parts: [month?, day?], is_open: false, is_stroked: false };
+    (!clock.is_empty()).then_some((date, clock))
+}
+
+/// By the first letters of its name.
+fn month_of(name: &str) -> Option<i64> {
+    let is_letters = name.starts_with(|letter: char| letter.is_ascii_alphabetic());
+    let plain = name.to_lowercase();
+    MONTHS.iter().position(|month| is_letters && plain.starts_with(month)).map(|at| at as i64 + 1)
 }
 
 /// Days since 1970: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018 or 25/04/2018. Ambiguous: month first
@@ -55,25 +94,21 @@ impl WrittenDate {
         let sign = text.chars().find(|c| ['-', '/', '.'].contains(c))?;
         let parts: Vec<&str> = text.split(sign).collect();
         let number = |text: &str| text.bytes().all(|b| b.is_ascii_digit()).then(|| text.parse::<i64>().ok()).flatten();
-        let named = |text: &str| {
-            let is_letters = text.starts_with(|letter: char| letter.is_ascii_alphabetic());
-            let plain = text.to_lowercase();
-            MONTHS.iter().position(|name| is_letters && plain.starts_with(name)).map(|at| at as i64 + 1)
-        };
         let is_stroked = sign == '/';
         match parts[..] {
             [year, month, day] if year.len() == 4 => {
-                let month = number(month).or_else(|| named(month))?;
+                let month = number(month).or_else(|| month_of(month))?;
                 Some(Self { year: number(year)?, parts: [month, number(day)?], is_open: false, is_stroked })
             }
-            [one, other, year] if year.len() == 4 => match named(other) {
-                Some(month) => {
-                    Some(Self { year: number(year)?, parts: [month, number(one)?], is_open: false, is_stroked })
-                }
-                None => {
-                    Some(Self { year: number(year)?, parts: [number(one)?, number(other)?], is_open: true, is_stroked })
-                }
-            },
+            // Two digits of a year between dashes may be a day.
+            [one, other, year] if year.len() == 4 || year.len() == 2 && sign != '-' => {
+                let year = number(year)? + if year.len() == 2 { 2000 } else { 0 };
+                let (parts, is_open) = match month_of(other) {
+                    Some(month) => ([month, number(one)?], false),
+                    None => ([number(one)?, number(other)?], true),
+                };
+                Some(Self { year, parts, is_open, is_stroked })
+            }
             _ => None,
         }
     }
@@ -134,7 +169,7 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     };
     let clock = clock.strip_suffix('Z').unwrap_or(clock);
     let (clock, offset) = match clock.rfind(['+', '-']) {
-        Some(at) => (&clock[..at], offset(&clock[at..])?),
+        Some(at) => (clock[..at].trim_end(), offset(&clock[at..])?),
         None => (clock, 0),
     };
     // Minutes and seconds of an elapsed time.
@@ -352,11 +387,19 @@ mod tests {
             ("2018-04-25 10:00:13", 0),
             ("2018-04-25T12:00:13.5+02:00", 500_000_000),
             ("2018-04-25T08:30:13-0130", 0),
+            ("2018-04-25 12:00:13 +0200", 0),
             ("2018/04/25 10:00:13.000001", 1_000),
             ("25.04.2018 10:00:13.123456789", 123_456_789),
             ("04/25/2018 10:00:13 AM", 0),
             ("25/04/2018 10:00:13", 0),
             ("25-Apr-2018 10:00:13", 0),
+            ("20180425T100013.5Z", 500_000_000),
+            ("2018-04-25_10-00-13.5", 500_000_000),
+            ("04/25/18 10:00:13 AM", 0),
+            ("25.04.18 10:00:13", 0),
+            ("Apr 25, 2018 10:00:13.5", 500_000_000),
+            ("25 April 2018 12:00:13 +0200", 0),
+            ("Wed Apr 25 10:00:13.5 2018", 500_000_000),
         ] {
             assert_eq!(date_time(text), Some(NS + fraction), "{text}");
         }
@@ -369,7 +412,7 @@ mod tests {
         assert_eq!(time_of_day("12:30 am"), Some(30 * 60 * 1_000_000_000));
         assert_eq!((date("2000-02-29"), date("1970-01-01"), date("1969-12-31")), (Some(11_016), Some(0), Some(-1)));
         assert_eq!(date("1900-03-01").map(|day| day - date("1900-02-28").unwrap_or(0)), Some(1));
-        for text in ["2018-02-29", "2018-13-01", "1.2.3", "0.5", "-0.012", "2018-04", "1e-3", "18-04-25"] {
+        for text in ["2018-02-29", "2018-13-01", "1.2.3", "1.2.34.5", "0.5", "-0.012", "2018-04", "1e-3", "18-04-25"] {
             assert_eq!(date(text), None, "{text}");
         }
         for text in

@@ -4,7 +4,7 @@ use crate::input::delimited_text;
 use crate::rows::batch::Number;
 
 /// The first that occurs; else blanks.
-const SEPARATORS: [char; 3] = [';', '\t', ','];
+const SEPARATORS: [char; 4] = [';', '\t', ',', '|'];
 
 const MISSING: [&str; 22] = [
     "", "nan", "na", "n/a", "null", "none", "nil", "-", "--", "---", "*", "?", "#n/a", "#na", "#value!", "#num!",
@@ -125,7 +125,7 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// Also with decimal comma; NaN if missing; `None` for other texts.
+/// Also with decimal comma, with the exponent `D` of Fortran or behind a bracket; NaN if missing; `None` for other texts.
 pub(crate) fn number(field: &str) -> Option<Number> {
     if let Some(number) = short_number(field.as_bytes()) {
         return Some(number);
@@ -135,9 +135,11 @@ pub(crate) fn number(field: &str) -> Option<Number> {
     {
         return Some(Number::Integer(integer));
     }
-    let real = field.parse().ok().or_else(|| field.replace(',', ".").parse().ok());
+    let real = field.parse().ok().or_else(|| field.replace(',', ".").replace(['D', 'd'], "e").parse().ok());
     let missing = || MISSING.contains(&field.to_lowercase().as_str()).then_some(f64::NAN);
-    real.or_else(missing).map(Number::Real)
+    let inner = field.trim_matches(['[', ']', '(', ')']);
+    let in_brackets = || number(Some(inner).filter(|inner| !inner.is_empty() && inner.len() < field.len())?);
+    real.or_else(missing).map(Number::Real).or_else(in_brackets)
 }
 
 /// Both numerator and power of ten are exact.

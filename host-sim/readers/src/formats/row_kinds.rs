@@ -8,7 +8,8 @@ use crate::input::input_error::Reason;
 const MOST_KINDS: usize = 8;
 const LEAST_ROWS: usize = 2;
 /// Columns that number devices, between blanks.
-const NUMBERED: &str = "id device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance";
+const NUMBERED: &str = "id device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance \
+    sensor_type sensortype";
 const LEAST_NUMBERS: usize = 2;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -148,9 +149,13 @@ impl RowKinds {
     }
 }
 
-/// No number, time or missing value.
+/// No number, time or missing value; an address in hexadecimal digits may begin with a digit.
 fn is_label(field: &str) -> bool {
-    let starts = field.chars().next().is_some_and(char::is_alphabetic);
+    let is_address = || {
+        field.split([':', '-']).count() > 3
+            && field.bytes().all(|byte| b":-".contains(&byte) || byte.is_ascii_hexdigit())
+    };
+    let starts = field.chars().next().is_some_and(char::is_alphabetic) || is_address();
     let is_time = || calendar::date_time(field).or_else(|| calendar::date(field)).is_some();
     starts && field.replace(',', ".").parse::<f64>().is_err() && !is_time() && calendar::time_of_day(field).is_none()
 }

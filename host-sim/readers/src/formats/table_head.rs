@@ -66,6 +66,9 @@ impl TableHead {
         let rows = self.rows.split_off(first);
         self.preamble.extend(std::mem::replace(&mut self.rows, rows));
         self.separator = self.rows.front().and_then(|(_, text)| separator_of(text));
+        while let Some(row) = self.preamble.pop_if(|(_, text)| has_words_for_values(&kinds_of_fields(text), &own)) {
+            self.rows.push_front(row);
+        }
     }
 
     pub(crate) fn fields(&self) -> Vec<Vec<&str>> {
@@ -259,6 +262,14 @@ fn kinds_of_fields(text: &str) -> Vec<FieldKind> {
     split(text, separator_of(text)).map(kind).collect()
 }
 
+/// True for words where `rows` have numbers, behind a first number: a row, and no heading.
+fn has_words_for_values(fields: &[FieldKind], rows: &[FieldKind]) -> bool {
+    let is_value = |(field, row): (&FieldKind, &FieldKind)| field.is_like(*row) || *row == FieldKind::Number;
+    let first = rows.iter().position(|row| *row == FieldKind::Number);
+    let begins = first.is_some_and(|first| fields.get(first) == Some(&FieldKind::Number));
+    begins && fields.len() == rows.len() && fields.iter().zip(rows).all(is_value)
+}
+
 /// Separator and fields; final tabs are cut as blanks.
 fn shape(text: &str) -> Option<(Option<char>, usize)> {
     let separator = separator_of(text);
@@ -389,6 +400,9 @@ pub(crate) fn named_columns(names: &[String], units: Option<&[Option<Unit>]>) ->
 
 /// At least half numbers or calendar times, or all missing; other texts may be frames.
 pub(crate) fn is_row(text: &str) -> bool {
+    if text.starts_with('{') {
+        return false; // An object of names and numbers.
+    }
     let separator = separator_of(text);
     let (mut numbers, mut missing, mut fields, mut named) = (0, 0, 0, 0);
     for field in split(text, separator) {

@@ -1,6 +1,7 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ReadOptions, Role, SelectionError, as_they_are};
+use crate::columns::unit::COUNT;
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
 use crate::formats::fields::{leading_number, number, split};
 use crate::formats::labelled_row;
@@ -17,8 +18,9 @@ use crate::rows::whole_table::WholeTable;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-/// Largest share of damaged rows, and number before it counts.
+/// Largest share of damaged rows, and number before it counts; largest share of rows with words for values.
 const MOST_DAMAGED: f64 = 0.1;
+const MOST_WORDS: f64 = 0.5;
 const FIRST_DAMAGED: u64 = 64;
 
 pub(crate) fn read_whole(
@@ -49,34 +51,58 @@ enum Layout {
     Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
 }
 
+/// Rows of a kind that is counted, with the first.
 #[derive(Debug, Default)]
-struct DamagedRows {
+struct CountedRows {
     rows: u64,
-    damaged: u64,
     first: Option<InputError>,
     note: String,
 }
 
-impl DamagedRows {
-    /// Leaves out a row; an error if these are too many.
-    fn add(&mut self, error: InputError) -> Result<(), InputError> {
-        self.damaged += 1;
+impl CountedRows {
+    fn add(&mut self, error: InputError) {
+        self.rows += 1;
         if self.first.is_none() {
             let line = error.line.map_or_else(String::new, |line| format!("line {line}: "));
             self.note = format!("{line}{}", error.reason);
             self.first = Some(error);
         }
-        if self.damaged >= FIRST_DAMAGED { self.check() } else { Ok(()) }
     }
 
-    fn check(&mut self) -> Result<(), InputError> {
-        let are_many = self.damaged as f64 > MOST_DAMAGED * self.rows as f64;
+    /// The first, if they are more than `most`.
+    fn check(&mut self, most: f64) -> Result<(), InputError> {
+        let are_many = self.rows as f64 > most;
         self.first.take_if(|_| are_many).map_or(Ok(()), Err)
     }
 
-    fn note(&self) -> Option<String> {
-        let Self { damaged, note, .. } = self;
-        (*damaged > 0).then(|| format!("{damaged} damaged rows are left out, the first of them {note}"))
+    fn note(&self, what: &str) -> Option<String> {
+        let Self { rows, note, .. } = self;
+        (*rows > 0).then(|| format!("{rows} {what}, the first of them {note}"))
+    }
+}
+
+#[derive(Debug, Default)]
+struct DamagedRows {
+    rows: u64,
+    damaged: CountedRows,
+    /// Rows with words for values.
+    words: CountedRows,
+}
+
+impl DamagedRows {
+    /// Leaves out a row; an error if these are too many.
+    fn add(&mut self, error: InputError) -> Result<(), InputError> {
+        self.damaged.add(error);
+        if self.damaged.rows >= FIRST_DAMAGED { self.check() } else { Ok(()) }
+    }
+
+    fn check(&mut self) -> Result<(), InputError> {
+        self.damaged.check(MOST_DAMAGED * self.rows as f64)
+    }
+
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let damaged = self.damaged.note("damaged rows are left out");
+        damaged.into_iter().chain(self.words.note("rows have words for values, which are missing"))
     }
 }
 
@@ -305,6 +331,7 @@ impl RowSource for TextTable {
             }
         }
         self.damaged.check()?;
+        self.damaged.words.check(MOST_WORDS * self.damaged.rows as f64)?;
         Ok(Ending { damage: self.lines.take_damage(), notes: self.notes() })
     }
 }
@@ -315,7 +342,7 @@ impl TextTable {
         let zeros = self.lines.zero_bytes();
         let of_zeros = (zeros > 0).then(|| format!("{zeros} bytes that are zero are left out"));
         let mut notes: Vec<String> = self.columns_notes.iter().cloned().chain(of_rate).collect();
-        notes.extend(self.damaged.note().into_iter().chain(of_zeros));
+        notes.extend(self.damaged.notes().chain(of_zeros));
         let (name, damaged, others) = match &self.layout {
             Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
             Layout::Labelled { others, .. } => {
@@ -438,7 +465,13 @@ impl TextTable {
                 }
             }
             match of_layout {
-                Ok(true) => return Ok(Some(line)),
+                Ok(true) => {
+                    if let Some((at, word)) = of_row.word.take().filter(|_| !*is_lenient) {
+                        let label = &chosen[at].label;
+                        damaged.words.add(InputError::field(file, line, label, Reason::NotNumber(word)));
+                    }
+                    return Ok(Some(line));
+                }
                 Ok(false) => {}
                 Err((Some(at), reason)) => damaged.add(InputError::field(file, line, &chosen[at].label, reason))?,
                 Err((None, reason)) => damaged.add(InputError::line(file, line, reason))?,
@@ -484,6 +517,10 @@ struct RowFields {
     read: Vec<(usize, usize)>,
     /// Column of each field; empty if a field has two.
     plain: Vec<Option<usize>>,
+    /// True for columns of values, which may be missing; registers always have counts.
+    are_values: Vec<bool>,
+    /// A word for a value in the last row, with its column.
+    word: Option<(usize, String)>,
 }
 
 impl RowFields {
@@ -494,7 +531,11 @@ impl RowFields {
         let column_at = |position| read.iter().find(|(of, _)| *of == position).map(|(_, at)| *at);
         let plain: Vec<Option<usize>> = (0..width).map(column_at).collect();
         let plain = if plain.iter().flatten().count() == read.len() { plain } else { Vec::new() };
-        Self { width, may_be_short, read, plain }
+        let is_value = |column: &ChosenColumn| {
+            matches!(column.role, Role::Channel(_)) && column.unit.is_none_or(|unit| unit.base != COUNT)
+        };
+        let are_values = chosen.iter().map(is_value).collect();
+        Self { width, may_be_short, read, plain, are_values, word: None }
     }
 
     /// Fast path of [`numbers`](Self::numbers) for plain lines, and the bytes of the line; `None` for any other.
@@ -522,13 +563,14 @@ impl RowFields {
     }
 
     fn numbers<'a>(
-        &self,
+        &mut self,
         mut fields: impl Iterator<Item = &'a str>,
         mut calendar: Option<&mut CalendarClock>,
         row: &mut Vec<Number>,
     ) -> Result<(), (Option<usize>, Reason)> {
         row.clear();
         row.resize(self.read.len(), Number::Real(f64::NAN));
+        self.word = None;
         let mut read = self.read.as_slice();
         let mut found = 0;
         let mut filled = 0;
@@ -562,6 +604,10 @@ impl RowFields {
                 };
                 match known {
                     Some(known) => row[*at] = known,
+                    // Garbled numbers have digits.
+                    None if self.are_values[*at] && !field.bytes().any(|byte| byte.is_ascii_digit()) => {
+                        self.word.get_or_insert_with(|| (*at, delimited_text::quote(field)));
+                    }
                     None if fault.as_ref().is_some_and(|(first, _)| first < at) => {}
                     None => fault = Some((*at, reason(delimited_text::quote(field)))),
                 }
@@ -577,7 +623,13 @@ impl RowFields {
         match fault {
             _ if !is_complete || filled > self.width => Err((None, Reason::FieldCount { found, expected: self.width })),
             Some((at, reason)) => Err((Some(at), reason)),
-            None => Ok(()),
+            None => match &self.word {
+                // Words alone are no row.
+                Some((at, word)) if row.iter().all(|number| number.value().is_nan()) => {
+                    Err((Some(*at), Reason::NotNumber(word.clone())))
+                }
+                _ => Ok(()),
+            },
         }
     }
 }

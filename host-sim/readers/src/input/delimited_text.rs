@@ -15,11 +15,16 @@ const MAX_LINE_BYTES: u64 = 1 << 16;
 
 const BUFFER_BYTES: usize = 1 << 16;
 
+/// Bytes that tell UTF-16 without a mark of its byte order.
+const UTF16_BYTES: usize = 16;
+
 /// An open file, read one line at a time.
 pub struct Lines {
     file: PathBuf,
     input: BufReader<Box<dyn Read + Send>>,
     line: u64,
+    /// Last byte of a line, once it is known.
+    end: Option<u8>,
     bytes: Vec<u8>,
     /// If not UTF-8.
     latin: String,
@@ -51,12 +56,12 @@ impl Lines {
         let fail = |reason| file.error(reason);
         let mut raw = file.open().map_err(|e| fail(Reason::Io(e)))?;
         // Without seeking: it may be a pipe.
-        let mut start = Vec::with_capacity(2);
-        raw.by_ref().take(2).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
+        let mut start = Vec::with_capacity(UTF16_BYTES);
+        raw.by_ref().take(UTF16_BYTES as u64).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
         if start.is_empty() {
             return Err(fail(Reason::Empty));
         }
-        let compressed = start == GZIP_MAGIC;
+        let compressed = start.starts_with(&GZIP_MAGIC);
         let is_utf16 = is_utf16(&start);
         monitor.begin();
         let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
@@ -80,6 +85,7 @@ impl Lines {
             file: file.name().to_owned(),
             input,
             line: 0,
+            end: None,
             bytes: Vec::new(),
             latin: String::new(),
             is_latin: false,
@@ -102,8 +108,7 @@ impl Lines {
         while !std::mem::take(&mut self.again) {
             self.line += 1;
             self.bytes.clear();
-            let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
-            let read = match read.map_err(read_failure) {
+            let read = match self.read_line().map_err(read_failure) {
                 Ok(read) => read,
                 Err(reason @ Reason::Truncated { .. }) => {
                     self.early_end = Some(reason).filter(|_| !self.monitor.is_cut());
@@ -111,7 +116,7 @@ impl Lines {
                 }
                 Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
             };
-            let has_end = self.bytes.last() == Some(&b'\n');
+            let has_end = self.bytes.last() == self.end.as_ref();
             // Stopped pipes and cut files may end within a line.
             if read == 0 || (self.monitor.is_cut() || self.early_end.is_some()) && !has_end {
                 self.damage = self.early_end.take().or(self.damage.take());
@@ -142,15 +147,35 @@ impl Lines {
         if let Ok(text) = text(&self.bytes) {
             return Ok(Some((self.line, text)));
         }
-        // Control characters are no text.
+        // Control characters are no text; bytes of other encodings may be Latin-1's.
         let latin = self.bytes.trim_ascii().iter().map(|byte| char::from(*byte));
-        if !self.are_rows && latin.clone().any(|letter| letter.is_control() && letter != '\t') {
+        if !self.are_rows && latin.clone().any(|letter| letter.is_ascii_control() && letter != '\t') {
             return Err(InputError::line(&self.file, self.line, Reason::other("not text in UTF-8 or Latin-1")));
         }
         self.latin.clear();
         self.latin.extend(latin);
         self.is_latin = true;
         Ok(Some((self.line, &self.latin)))
+    }
+
+    /// Into `bytes`. A text whose first lines have no line feed has lines that end in carriage returns.
+    fn read_line(&mut self) -> io::Result<usize> {
+        let end = self.end.unwrap_or(b'\n');
+        let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(end, &mut self.bytes)?;
+        let first = if self.end.is_none() { self.bytes.iter().position(|byte| *byte == b'\r') } else { None };
+        match first.filter(|_| self.bytes.last() != Some(&b'\n')) {
+            Some(first) => {
+                self.end = Some(b'\r');
+                let rest = Cursor::new(self.bytes.split_off(first + 1));
+                let later = std::mem::replace(&mut self.input, BufReader::new(Box::new(io::empty())));
+                self.input = BufReader::with_capacity(BUFFER_BYTES, Box::new(rest.chain(later)));
+                Ok(self.bytes.len())
+            }
+            None => {
+                self.end = Some(end);
+                Ok(read)
+            }
+        }
     }
 
     /// From here on all lines are rows, or damaged ones: one that is no text, or too long, costs itself alone.
@@ -221,8 +246,13 @@ impl Unended {
     }
 }
 
+/// By the mark of the byte order, or letters of which each has a byte that is zero.
 pub(crate) fn is_utf16(start: &[u8]) -> bool {
-    start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF")
+    let start = &start[..start.len().min(UTF16_BYTES)];
+    let has_zeros = |zero: usize| start.chunks(2).all(|unit| unit.get(zero) == Some(&0) && unit[1 - zero] != 0);
+    start.starts_with(b"\xFF\xFE")
+        || start.starts_with(b"\xFE\xFF")
+        || start.len() == UTF16_BYTES && (has_zeros(0) || has_zeros(1))
 }
 
 impl Drop for Lines {

@@ -5,7 +5,7 @@ use std::io::{self, Cursor, Read};
 /// Bytes that are read at a time; even.
 const CHUNK_BYTES: u64 = 1 << 15;
 
-/// Reads the text behind the mark of its byte order. What is no character becomes U+FFFD.
+/// Reads the text behind the mark of its byte order, or from its first letter. What is no character becomes U+FFFD.
 pub(crate) struct Utf16Reader<R> {
     input: R,
     unit: fn([u8; 2]) -> u16,
@@ -15,15 +15,17 @@ pub(crate) struct Utf16Reader<R> {
 }
 
 impl<R: Read> Utf16Reader<R> {
-    /// Reads the mark.
+    /// Reads the mark, or the first letter, of which one byte is zero.
     ///
     /// # Errors
     /// It cannot be read.
     pub(crate) fn new(mut input: R) -> io::Result<Self> {
         let mut mark = [0; 2];
         input.read_exact(&mut mark)?;
-        let unit = if mark == [0xFE, 0xFF] { u16::from_be_bytes } else { u16::from_le_bytes };
-        Ok(Self { input, unit, bytes: Vec::new(), text: Cursor::default() })
+        let unit = if mark == [0xFE, 0xFF] || mark[0] == 0 { u16::from_be_bytes } else { u16::from_le_bytes };
+        let has_mark = unit(mark) == 0xFEFF;
+        let bytes = if has_mark { Vec::new() } else { mark.to_vec() };
+        Ok(Self { input, unit, bytes, text: Cursor::default() })
     }
 
     /// Reads and decodes more; false at the end of the input.
@@ -68,11 +70,12 @@ mod tests {
         for shift in 0..4 {
             let text = format!("{}{text}", "x".repeat(shift));
             for to_bytes in [u16::to_le_bytes, u16::to_be_bytes] {
-                let units = std::iter::once(0xFEFF).chain(text.encode_utf16());
-                let bytes: Vec<u8> = units.flat_map(to_bytes).collect();
-                let mut read = String::new();
-                Utf16Reader::new(Cursor::new(bytes)).expect("a mark").read_to_string(&mut read).expect("text");
-                assert!(read == text, "{shift}");
+                let marked: Vec<u8> = std::iter::once(0xFEFF).chain(text.encode_utf16()).flat_map(to_bytes).collect();
+                for bytes in [&marked[..], &marked[2..]] {
+                    let mut read = String::new();
+                    Utf16Reader::new(Cursor::new(bytes)).expect("a letter").read_to_string(&mut read).expect("text");
+                    assert!(read == text, "{shift}");
+                }
             }
         }
         let read = |bytes: &[u8]| {

@@ -47,9 +47,15 @@ impl SteadyPart {
             };
             let (means, deviations) = (sorted(|of| of.0), sorted(|of| of.1));
             let usual = means.get(means.len() / 2).copied().unwrap_or(0.0);
-            let quiet = deviations.get(deviations.len() / 8).copied().unwrap_or(0.0).max(step.unwrap_or(0.0));
+            let step = step.unwrap_or(0.0);
+            let noisy = &deviations[deviations.partition_point(|deviation| *deviation <= step)..];
+            // A sensor that begins late, or has stopped, holds a value.
+            let holds_values = noisy.len() > deviations.len() / 2;
+            let quiet = if holds_values { noisy } else { &deviations };
+            let quiet = quiet.get(quiet.len() / 8).copied().unwrap_or(0.0).max(step);
             for (steady, (mean, deviation)) in is_steady.iter_mut().zip(&moments) {
-                let is_quiet = *deviation <= MOST_NOISE * quiet;
+                let is_held = holds_values && *deviation <= 0.0 && quiet > MOST_NOISE * step;
+                let is_quiet = *deviation <= MOST_NOISE * quiet && !is_held;
                 let is_usual = |limit: f64| is_force || (mean - usual).abs() < limit;
                 let is_rest = limit.is_none_or(|limit| is_usual(limit) && *deviation < limit);
                 // Without a value.

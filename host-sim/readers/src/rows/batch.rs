@@ -2,9 +2,11 @@
 
 use crate::columns::column_selection::{ChosenColumn, Role};
 use crate::columns::unit::{SECOND, Unit};
+use crate::columns::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::Reason;
 use measurement::ChannelProfile;
+use std::ops::Range;
 use time_base::{Order, ROWS_OF_FIRST, ROWS_OF_SET_CLOCK, StampOrder};
 
 /// Largest share of rows whose time goes back.
@@ -192,6 +194,11 @@ pub(crate) struct BatchBuilder {
     first_backwards: Option<(u64, f64)>,
     is_first_open: bool,
     row: Vec<f64>,
+    /// Positions of values of three axes.
+    axes: Vec<[usize; 3]>,
+    /// Rows in which nines stand for the values of three axes, and the first.
+    nines: u64,
+    first_nines: f64,
 }
 
 impl BatchBuilder {
@@ -217,6 +224,9 @@ impl BatchBuilder {
             first_backwards: None,
             is_first_open: true,
             row: Vec::new(),
+            axes: [GYROSCOPE, ACCELEROMETER, MAGNETOMETER].iter().filter_map(|names| axes(columns, names)).collect(),
+            nines: 0,
+            first_nines: f64::NAN,
         }
     }
 
@@ -280,6 +290,15 @@ impl BatchBuilder {
                 }
             }
         }
+        for [x, y, z] in &self.axes {
+            if values[*x] == values[*y] && values[*y] == values[*z] && is_of_nines(values[*x]) {
+                if self.nines == 0 {
+                    self.first_nines = values[*x];
+                }
+                self.nines += 1;
+                [x, y, z].into_iter().for_each(|axis| values[*axis] = f64::NAN);
+            }
+        }
         self.place(time, index, &values);
         self.row = values;
         Ok(())
@@ -298,10 +317,10 @@ impl BatchBuilder {
                 self.add(Some(time), index, values);
                 self.check_first();
             }
-            Order::AfterWrong(time) => {
+            Order::AfterWrong(time, wrong) => {
                 self.leave_out_back();
-                self.remove(self.batch.rows.saturating_sub(1));
-                self.order.forget_last();
+                self.remove(self.batch.rows.saturating_sub(wrong)..self.batch.rows);
+                (0..wrong).for_each(|_| self.order.forget_last());
                 self.add(Some(time), index, values);
             }
             Order::AfterSet(time, by) => {
@@ -337,10 +356,10 @@ impl BatchBuilder {
         self.batch.rows += 1;
     }
 
-    fn remove(&mut self, row: usize) {
-        let is_kept: Vec<bool> = (0..self.batch.rows).map(|at| at != row).collect();
+    fn remove(&mut self, rows: Range<usize>) {
+        let is_kept: Vec<bool> = (0..self.batch.rows).map(|at| !rows.contains(&at)).collect();
         self.batch.retain(&is_kept);
-        self.batch.backwards.push(row);
+        self.batch.backwards.extend(rows.clone().map(|_| rows.start));
         self.batch.backwards.sort_unstable();
     }
 
@@ -358,7 +377,7 @@ impl BatchBuilder {
         if is_time {
             self.is_first_open = false;
             if self.order.is_first_wrong(&self.batch.times) {
-                self.remove(0);
+                self.remove(0..1);
             }
         }
     }
@@ -373,7 +392,7 @@ impl BatchBuilder {
         let offset = self.order.offset();
         if is_first_wrong {
             self.order.begin_anew();
-            self.remove(0);
+            self.remove(0..1);
         } else {
             self.order.set_clock(rows[0].time, rows[0].number);
         }
@@ -395,7 +414,10 @@ impl BatchBuilder {
     }
 
     pub(crate) fn notes(&self) -> Vec<String> {
-        self.order.notes()
+        let Self { nines, first_nines, .. } = self;
+        let of_nines =
+            || format!("{nines} times {first_nines} stands in all axes of a sensor, for values that are missing");
+        self.order.notes().into_iter().chain((*nines > 0).then(of_nines)).collect()
     }
 
     /// On rows with earlier times, `None` without any; an error if they are many, or without a row.
@@ -412,6 +434,18 @@ impl BatchBuilder {
         }
         Ok(Some(format!("{} rows whose time goes back are left out, the first of them row {row}", self.backwards)))
     }
+}
+
+/// Positions of these channels, unless they are register words.
+fn axes(columns: &[ValueColumn], names: &[&str; 3]) -> Option<[usize; 3]> {
+    let position = |name: &str| columns.iter().position(|of| of.profile.name == name && of.register.is_none());
+    Some([position(names[0])?, position(names[1])?, position(names[2])?])
+}
+
+/// Such as -9999 or 999.9, which stands for no value where it is that of all axes.
+fn is_of_nines(value: f64) -> bool {
+    let digits: String = value.abs().to_string().chars().filter(|letter| *letter != '.').collect();
+    digits.len() > 2 && digits.bytes().all(|digit| digit == b'9')
 }
 
 /// NaN if missing.

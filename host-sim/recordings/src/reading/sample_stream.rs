@@ -2,7 +2,7 @@
 
 use crate::batch_source::{BatchSource, RecordedRows};
 use crate::file_format::{RecordedInput, options_of_counts};
-use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
+use crate::reading::column_survey::{ColumnSurvey, are_all_counts, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
 use crate::recording::{Recording, Verdict};
 use adis16405_driver::{Faults, GyroRange};
@@ -162,8 +162,18 @@ impl SampleStream {
         Self::open(Origin::File { input, options: Box::new(options), range: None }, reading, &monitor)
     }
 
-    fn open(origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
-        let mut survey = Survey::read(&origin, reading, u64::MAX, monitor)?;
+    fn open(mut origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
+        let survey = Survey::read(&origin, reading, u64::MAX, monitor);
+        let mut survey = survey.or_else(|error| match &mut origin {
+            // A stated rate needs no times, which may be the fault.
+            Origin::File { options, .. } if reading.stated_hz.is_some() => {
+                options.selection = std::mem::take(&mut options.selection).without_time();
+                let Ok(mut survey) = Survey::read(&origin, reading, u64::MAX, monitor) else { return Err(error) };
+                survey.read.notes.push(format!("the time stamps are ignored: {error}"));
+                Ok(survey)
+            }
+            _ => Err(error),
+        })?;
         let samples = survey.samples(reading.kept)?;
         Ok(Self { origin, reading, survey, samples, monitor: monitor.clone() })
     }
@@ -702,11 +712,8 @@ impl StreamedColumn {
     /// Sets `off_step` for a number off the step.
     fn channel(&self, values: &[f64], verdicts: &[Verdict], off_step: &mut bool) -> Option<MeasuredChannel> {
         let (quantizer, profile) = (self.quantizer.as_ref()?, self.profile()?);
-        if self.column.register.is_some() && verdicts.iter().all(|verdict| verdict.refused.is_empty()) {
-            // All but missing words are counts.
-            if !values.iter().any(|value| value.is_nan()) {
-                return Some(MeasuredChannel::new(profile, values.iter().map(|value| *value as i32).collect()));
-            }
+        if are_all_counts(&self.column, values, verdicts) {
+            return Some(MeasuredChannel::new(profile, values.iter().map(|value| *value as i32).collect()));
         }
         let mut counts = Vec::with_capacity(values.len());
         let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();

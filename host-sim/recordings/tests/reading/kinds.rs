@@ -183,6 +183,7 @@ fn rows_of_different_origin_are_several_sensors() {
                 assert_eq!(read.samples.channels.len(), 3, "{seed} {way}: {proposal:?}");
                 assert!((read.rate_hz() / hz - 1.0).abs() < 1e-3, "{seed} {way}: {} {hz}", read.rate_hz());
                 assert!(is_near(read, channel, deviation), "{seed} {way}: {} {proposal:?}", read.neighbours(channel));
+                assert!(!read.notes_contain("another quantity"), "{seed} {way}: {:?}", read.notes);
             }
         }
     }
@@ -440,5 +441,173 @@ fn a_device_that_is_turned_between_rests_is_at_rest_in_each() {
         let longest = rests.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
         assert!(steady.is_rest && is_inside, "{seed}: {steady:?} of {rests:?}");
         assert!(steady.rows.len() + 4 * 256 > longest, "{seed}: {steady:?} of {rests:?}");
+    }
+}
+
+/// A word for a value costs the value, in whichever row it is; the stamp keeps its place.
+#[test]
+fn a_word_for_a_value_costs_the_value() {
+    for (seed, word) in [(1, "ERROR"), (2, "timeout"), (3, "over range"), (4, "<none>"), (5, "-nan(ind)")] {
+        let mut normal = normal(seed);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let (mut content, mut words) = ("t_s,gx_dps,gy_dps,gz_dps\n".to_owned(), 0);
+        for row in 0..ROWS {
+            let has_word = row % 50 == 0 || random.random_range(0..10) == 0;
+            words += usize::from(has_word);
+            let mut values = [(); 3].map(|()| format!("{:.4}", RATE * normal()));
+            if has_word {
+                values[1..].fill(word.to_owned());
+            }
+            content += &format!("{:.2},{}\n", f64::from(row) / 100.0, values.join(","));
+        }
+        let read = text("rows.csv", &content, &[]);
+        assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0), "{word}");
+        assert_eq!((read.refused("gyro_x", "missing"), read.refused("gyro_z", "missing")), (0, words), "{word}");
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_y", RATE), "{word}");
+        let note = format!("{words} rows have words for values, which are missing, the first of them line 2");
+        assert!(read.notes_contain(&note), "{word}: {:?}", read.notes);
+    }
+    // A column of words is none of a channel.
+    let content = "t_s,gx_dps\n".to_owned() + &(0..ROWS).map(|row| format!("{row},idle\n")).collect::<String>();
+    let error = read("rows.csv", content.as_bytes(), &[""; 0]).err().expect("no values").to_string();
+    assert!(error.contains("line 2: column gx: \"idle\" is not a number"), "{error}");
+}
+
+/// Nines in all axes of a sensor are no values; in one they may be.
+#[test]
+fn nines_in_all_axes_are_missing_values() {
+    for (seed, nines) in [(1, "-9999"), (2, "999.9"), (3, "99999.00"), (4, "-999")] {
+        let mut normal = normal(seed);
+        let mut content = "t_s,gx_dps,gy_dps,gz_dps\n".to_owned();
+        for row in 0..ROWS {
+            let values = [(); 3].map(|()| format!("{:.4}", RATE * normal()));
+            let values = if row % 50 == 7 { [nines, nines, nines].join(",") } else { values.join(",") };
+            content += &format!("{:.2},{values}\n", f64::from(row) / 100.0);
+        }
+        let read = text("rows.csv", &content, &[]);
+        assert_eq!((read.samples.len() as u32, read.refused("gyro_y", "missing")), (ROWS, 60), "{nines}");
+        assert!(is_near(&read, "gyro_z", RATE), "{nines}");
+        let value: f64 = nines.parse().expect("a number");
+        assert!(read.notes_contain(&format!("60 times {value} stands in all axes of a sensor")), "{:?}", read.notes);
+    }
+}
+
+/// Line ends, delimiters, brackets, exponents and encodings of other programs.
+#[test]
+fn whatever_a_program_writes_between_numbers_they_are_read() {
+    let table = |begin: &str, separator: &str, end: &str, exponent: &str| {
+        let mut normal = normal(7);
+        let mut content = ["t_s", "gx_dps", "gy_dps", "gz_dps"].join(separator) + end;
+        for row in 0..ROWS {
+            let values = [(); 3].map(|()| format!("{:.4}{exponent}", RATE * normal())).join(separator);
+            content += &format!("{begin}{:.2}{separator}{values}{end}", f64::from(row) / 100.0);
+        }
+        content
+    };
+    let utf16 = |to_bytes: fn(u16) -> [u8; 2]| table("", ",", "\n", "").encode_utf16().flat_map(to_bytes).collect();
+    // Shift-JIS for a measurement.
+    let japanese = [b"\x8c\x76\x91\xaa\n", table("", ",", "\n", "").as_bytes()].concat();
+    for (what, content) in [
+        ("carriage returns", table("", ",", "\r", "").into_bytes()),
+        ("bars", table("", "|", "\n", "").into_bytes()),
+        ("brackets", table("[", ", ", "]\n", "").replacen(']', "", 1).into_bytes()),
+        ("parentheses", table("(", ", ", ")\r\n", "").replacen(')', "", 1).into_bytes()),
+        ("exponents of Fortran", table("", " ", "\n", "D+00").into_bytes()),
+        ("UTF-16, low byte first", utf16(u16::to_le_bytes)),
+        ("UTF-16, high byte first", utf16(u16::to_be_bytes)),
+        ("another encoding", japanese),
+    ] {
+        let read = read("rows.csv", &content, &[""; 0]).unwrap_or_else(|error| panic!("{what}: {error}"));
+        assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0), "{what}");
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_z", RATE), "{what}");
+    }
+}
+
+/// The rate of the user needs no column of times, whatever is in it.
+#[test]
+fn a_stated_rate_beats_a_column_that_is_no_time() {
+    type TimeOfRow = fn(u32) -> String;
+    let times: [(&str, TimeOfRow); 5] = [
+        ("words", |row| format!("tick {row}")),
+        ("reversed", |row| format!("{:.2}", f64::from(ROWS - row) / 100.0)),
+        ("in groups", |row| format!("\"1,{:03},000\"", row % 1000)),
+        ("far apart", |row| if row < 1500 { row.to_string() } else { (u64::from(row) * 10_000_000).to_string() }),
+        ("constant", |_| "5".to_owned()),
+    ];
+    for (what, time) in times {
+        let mut normal = normal(8);
+        let mut content = "time,gx_dps,gy_dps,gz_dps\n".to_owned();
+        for row in 0..ROWS {
+            let [x, y, z] = [(); 3].map(|()| RATE * normal());
+            content += &format!("{},{x:.4},{y:.4},{z:.4}\n", time(row));
+        }
+        let read = text("rows.csv", &content, &["--rate", "100"]);
+        assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0), "{what}");
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-9 && is_near(&read, "gyro_x", RATE), "{what}");
+        assert!(read.notes_contain("the time stamps are ignored: "), "{what}: {:?}", read.notes);
+    }
+}
+
+/// Up to eight rows of a set clock that is set back.
+#[test]
+fn wrong_stamps_in_a_row_are_left_out() {
+    for seed in 0..12 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let (first, wrong) = (random.random_range(40..ROWS - 40), random.random_range(1..=8_u32));
+        let by: f64 = random.random_range(5.0..1e6);
+        let mut normal = normal(seed);
+        let mut content = "t_s,gx_dps,gy_dps,gz_dps\n".to_owned();
+        for row in 0..ROWS {
+            let [x, y, z] = [(); 3].map(|()| RATE * normal());
+            let time = f64::from(row) / 100.0 + if (first..first + wrong).contains(&row) { by } else { 0.0 };
+            content += &format!("{time:.2},{x:.4},{y:.4},{z:.4}\n");
+        }
+        let read = text("rows.csv", &content, &[]);
+        let found = (read.samples.len() as u32, read.dropped("time_backwards") as u32, read.missing());
+        assert_eq!(found, (ROWS - wrong, wrong, 0), "{seed}: {wrong} by {by}: {:?}", read.notes);
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-4, "{seed}: {}", read.rate_hz());
+    }
+}
+
+/// Addresses of devices, and numbers of kinds of sensors.
+#[test]
+fn rows_of_several_devices_are_told_by_any_label() {
+    for (heading, labels) in [
+        ("address", ["00:07:80:0F:0A:11", "00:07:80:0F:0A:12"]),
+        ("address", ["00-07-80-12-10-11", "10-07-80-12-10-12"]),
+        ("sensor_type", ["4", "11"]),
+        ("device", ["left", "right"]),
+    ] {
+        let mut normal = normal(9);
+        let mut content = format!("{heading},t_s,gx_dps,gy_dps,gz_dps\n");
+        for row in 0..ROWS {
+            for (label, more) in labels.into_iter().zip([0.0, 0.003]) {
+                let [x, y, z] = [(); 3].map(|()| RATE * normal());
+                content += &format!("{label},{:.3},{x:.4},{y:.4},{z:.4}\n", f64::from(row) / 100.0 + more);
+            }
+        }
+        let (_, found) = as_proposed(content.as_bytes(), &[]);
+        let topics: Vec<_> = found.iter().filter_map(|(proposal, _)| proposal.topic.as_deref()).collect();
+        assert_eq!(topics, labels);
+        assert!(found.iter().all(|(_, read)| (read.rate_hz() / 100.0 - 1.0).abs() < 1e-6));
+    }
+}
+
+/// Until then its columns hold a value, which is not the quietest part.
+#[test]
+fn a_sensor_that_begins_late_is_not_at_rest_before() {
+    for held in [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]] {
+        let mut normal = normal(10);
+        let mut content = "t_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n".to_owned();
+        for row in 0..4 * ROWS {
+            let rate = [(); 3].map(|()| RATE * normal());
+            let force = [0.0, 0.0, 1.0].map(|of: f64| of + FORCE * normal());
+            let [ax, ay, az] = if row < 1500 { held } else { force };
+            let [x, y, z] = rate;
+            content += &format!("{:.2},{x:.4},{y:.4},{z:.4},{ax:.6},{ay:.6},{az:.6}\n", f64::from(row) / 100.0);
+        }
+        let (tables, _) = as_proposed(content.as_bytes(), &[]);
+        let part = tables[0].proposals[0].part.expect("a part at rest");
+        assert!((15.0..18.0).contains(&part.from_s) && part.to_s > 118.0, "{held:?}: {part:?}");
     }
 }
