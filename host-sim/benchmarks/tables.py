@@ -16,7 +16,7 @@ SAMPLES = (("1 … 4", 1, 4), ("8 … 512", 8, 512), ("1,024 … 8,192", 1024, 8
 # A text that only one kind of sentence under "Contradicted" contains, and the row of the table for that kind.
 SENTENCES = {
     "standard errors": "… at τ = …: σ is … the model (… standard errors)",
-    "smaller error than it has": "a Kalman filter with the models of … would claim a smaller error than it has",
+    "smaller error than it has": "a Kalman filter with the models of … claims a smaller error than it has",
 }
 TOLERANCE = 1.5  # largest ratio of two errors on unseen data that count as equally good
 FAILS = 3.0  # deviance per point of a model that fails

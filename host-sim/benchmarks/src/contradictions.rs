@@ -1,21 +1,29 @@
-//! Benchmark of the sentences under "Contradicted" in reports of pure N, B and K in a constant environment.
+//! Benchmark of the sentences on a model that is off, in reports of pure N, B and K in a constant environment.
 
+use crate::arguments::{MOST_RECORDINGS, cores, jobs, positive};
 use crate::parallel;
-use crate::undeclared::{DrawnRecording, RecordingGroup, ScoreError};
+use crate::undeclared::{DrawnRecording, RecordingGroup, SEEDS_PER_GROUP, ScoreError};
 use adis16405_driver::Channel;
+use clap::{Args, value_parser};
 use noise_analysis::analysis::analyze;
 use recordings::time_base::measurement;
 use serde::Serialize;
 use virtual_sensor::SensorScenario;
 
-/// Records to examine.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Count the sentences on places where data and model disagree, in the reports of noise with nothing hidden.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct ContradictionPlan {
     /// Records of six gyros and accelerometers each.
+    #[arg(long, default_value_t = 200, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
     pub records: u64,
     /// Length of a record, s.
+    #[arg(long, default_value_t = 900.0, value_parser = positive)]
     pub seconds: f64,
+    /// Seed of the first record.
+    #[arg(long = "seed", default_value_t = 0, value_parser = value_parser!(u64).range(..SEEDS_PER_GROUP / 2))]
     pub first_seed: u64,
+    /// Records that are examined at a time [default: one a core].
+    #[arg(long, default_value_t = cores(), value_parser = jobs, hide_default_value = true)]
     pub jobs: usize,
 }
 
@@ -23,7 +31,7 @@ pub struct ContradictionPlan {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ContradictedRecord {
     pub seed: u64,
-    /// Every sentence under "Contradicted".
+    /// Every sentence on a place where data and model disagree.
     pub sentences: Vec<String>,
 }
 

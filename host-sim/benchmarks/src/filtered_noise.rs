@@ -11,8 +11,10 @@ mod table;
 
 pub use table::{FilterCell, FilteredChannel, FilteredCoefficient, FilteredNoiseTable};
 
+use crate::arguments::{MOST_RECORDINGS, cores, in_filter, jobs, positive};
 use crate::parallel;
 use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
+use clap::{Args, value_parser};
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, Parameter};
@@ -28,22 +30,31 @@ const RESOLUTION: f64 = 0.05;
 /// N in °/√s, B in °/s and K in °/s/√s of the published characterisation (docs/paper.md).
 const COEFFICIENTS: [f64; 3] = [0.0368, 0.0093, 0.0013];
 /// Taps of each of the two averages.
-pub const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
+const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
 /// Decimations: every 1st, 2nd, 4th or 9th value is read.
-pub const READ_EVERY: [usize; 4] = [1, 2, 4, 9];
+const READ_EVERY: [usize; 4] = [1, 2, 4, 9];
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 
-/// Records to simulate.
-#[derive(Debug, Clone, PartialEq)]
+/// Compare N, B and K behind the part's filter with their truth, nothing else hidden.
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct FilteredNoisePlan {
-    /// Taps of each of the two averages, 1 or more.
+    /// Taps of each of the two averages.
+    #[arg(long, value_delimiter = ',', default_values_t = TAPS, value_parser = in_filter)]
     pub taps: Vec<usize>,
+    /// Which of the values are read: 1 for every one, 2 for every second.
+    #[arg(long, value_delimiter = ',', default_values_t = READ_EVERY, value_parser = in_filter)]
     pub every: Vec<usize>,
-    /// Records of three gyros per filter and reading; the noises are the same behind all filters.
+    /// Records of three gyros behind each filter; the noises are the same behind all filters.
+    #[arg(long, default_value_t = 300, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
     pub records: u64,
     /// Length of a record, s.
+    #[arg(long, default_value_t = 1800.0, value_parser = positive)]
     pub seconds: f64,
+    /// Seed of the first record.
+    #[arg(long = "seed", default_value_t = 1)]
     pub first_seed: u64,
+    /// Records that are examined at a time [default: one a core].
+    #[arg(long, default_value_t = cores(), value_parser = jobs, hide_default_value = true)]
     pub jobs: usize,
 }
 

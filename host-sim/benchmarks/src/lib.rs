@@ -1,5 +1,6 @@
 //! Benchmarks of the noise analysis on recordings with known noise or known hidden effects.
 
+pub mod arguments;
 pub mod contradictions;
 pub mod filtered_noise;
 pub mod losses;

@@ -15,16 +15,25 @@ pub use loss_pattern::LossPattern;
 pub use noise::{RATE_HZ, TestNoise};
 pub use table::{CoefficientComparison, LossComparison, LossTable, OctaveRatio};
 
+use crate::arguments::{MOST_RECORDINGS, cores, jobs};
 use crate::parallel;
+use clap::{Args, value_parser};
 use std::convert::Infallible;
 
-/// The records to simulate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Take samples out of records and compare variance and coefficients with those of the complete records.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct LossPlan {
+    /// Records of each noise.
+    #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(2..=MOST_RECORDINGS))]
     pub records: u64,
-    /// Samples of each record; a power of two.
-    pub samples: usize,
+    /// Binary logarithm of the number of samples of a record, at 204.8 SPS; 20 is 1.4 hours.
+    #[arg(long, default_value_t = 20, value_parser = value_parser!(u32).range(14..=24))]
+    pub samples_log2: u32,
+    /// Seed of the first record.
+    #[arg(long, default_value_t = 1)]
     pub first_seed: u64,
+    /// Records that are simulated at a time [default: one a core].
+    #[arg(long, default_value_t = cores(), value_parser = jobs, hide_default_value = true)]
     pub jobs: usize,
 }
 
@@ -44,13 +53,17 @@ impl LossPlan {
                 comparisons.push(LossComparison::new(of_noise[0].0, pattern, &pairs));
             }
         }
-        LossTable { records: self.records, rate_hz: RATE_HZ, samples: self.samples, comparisons }
+        LossTable { records: self.records, rate_hz: RATE_HZ, samples: self.samples(), comparisons }
+    }
+
+    fn samples(&self) -> usize {
+        1 << self.samples_log2
     }
 
     /// The record of a seed, complete and with each pattern of losses.
     fn record(&self, noise: TestNoise, seed: u64) -> Vec<EstimatedRecord> {
-        let record = noise.record(self.samples, seed);
-        let losses = LossPattern::ALL.into_iter().map(|pattern| pattern.gaps(self.samples, seed));
+        let record = noise.record(self.samples(), seed);
+        let losses = LossPattern::ALL.into_iter().map(|pattern| pattern.gaps(self.samples(), seed));
         std::iter::once(Vec::new()).chain(losses).map(|gaps| EstimatedRecord::new(noise, &record, &gaps)).collect()
     }
 }

@@ -34,7 +34,9 @@ pub use measured::{
 pub use outside::{OutsideEffect, OutsideKind};
 pub use score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
 
+use crate::arguments::{MOST_RECORDINGS, cores, jobs, loss_percent};
 use crate::parallel;
+use clap::{Args, value_parser};
 use serde::Serialize;
 
 /// Offset of the sealed seeds; earlier ones, 2⁴⁰ … 2⁶², have been used.
@@ -42,23 +44,41 @@ const SEALED: u64 = 1 << 63;
 /// Number of seeds reserved for each group.
 pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
-/// Recordings to simulate and score.
-#[derive(Debug, Clone, PartialEq)]
+/// Hide random effects in recordings and score how well the analysis names them.
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct UndeclaredPlan {
+    /// Kind that is hidden alone; may be repeated [default: all].
+    #[arg(long = "kind", value_enum)]
     pub kinds: Vec<EffectKind>,
+    /// Recordings a kind.
+    #[arg(long, default_value_t = 40, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub per_kind: u64,
-    pub empty: u64,
+    /// Recordings with nothing hidden.
+    #[arg(long, default_value_t = 200, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
+    pub nothing: u64,
+    /// Recordings with two effects.
+    #[arg(long, default_value_t = 200, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub pairs: u64,
+    /// Recordings with three effects.
+    #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub triples: u64,
-    /// Number of recordings of each kind outside the vocabulary.
+    /// Recordings of each kind of effect that no kind of the report describes.
+    #[arg(long, value_name = "PER_KIND", default_value_t = 20, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub outside: u64,
     /// Length of a recording, s.
+    #[arg(long, default_value_t = 1800.0)]
     pub seconds: f64,
-    /// Samples lost at random in every recording, %.
+    /// Samples that are lost at random in every recording, %.
+    #[arg(long = "loss", value_name = "PERCENT", default_value_t = 0.0, value_parser = loss_percent)]
     pub loss_percent: f64,
-    /// First seed of each group; all seeds stay below [`SEEDS_PER_GROUP`].
+    /// First seed of each group of recordings.
+    #[arg(long, default_value_t = 0, value_parser = value_parser!(u64).range(..SEEDS_PER_GROUP / 2))]
     pub seed: u64,
+    /// Take the seeds that are kept for the end.
+    #[arg(long)]
     pub sealed: bool,
+    /// Recordings that are examined at a time [default: one a core].
+    #[arg(long, default_value_t = cores(), value_parser = jobs, hide_default_value = true)]
     pub jobs: usize,
 }
 
@@ -72,8 +92,9 @@ impl UndeclaredPlan {
     fn recordings(&self) -> Vec<(RecordingGroup, u64)> {
         let base = self.seed + if self.sealed { SEALED } else { 0 };
         let seed = |group: u64, number: u64| group * SEEDS_PER_GROUP + base + number;
-        let nothing = (0..self.empty).map(|number| (RecordingGroup::Nothing, seed(0, number)));
-        let singles = self.kinds.iter().flat_map(|&kind| {
+        let nothing = (0..self.nothing).map(|number| (RecordingGroup::Nothing, seed(0, number)));
+        let kinds = if self.kinds.is_empty() { &EffectKind::ALL[..] } else { self.kinds.as_slice() };
+        let singles = kinds.iter().flat_map(|&kind| {
             (0..self.per_kind).map(move |number| (RecordingGroup::Single(kind), seed(2 + kind as u64, number)))
         });
         let pairs = (0..self.pairs).map(|number| (RecordingGroup::Pair, seed(1, number)));

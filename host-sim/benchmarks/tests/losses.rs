@@ -6,7 +6,7 @@ use benchmarks::losses::{LossPattern, LossPlan, TestNoise};
 #[test]
 fn lost_samples_bias_neither_variance_nor_coefficients_and_keep_the_longest_averaging_time() {
     const RECORDS: u64 = 24;
-    let table = LossPlan { records: RECORDS, samples: 1 << 17, first_seed: 5_000, jobs: 2 }.run(|_, _| ());
+    let table = LossPlan { records: RECORDS, samples_log2: 17, first_seed: 5_000, jobs: 2 }.run(|_, _| ());
     assert_eq!(table.comparisons.len(), TestNoise::ALL.len() * LossPattern::ALL.len());
     for comparison in &table.comparisons {
         let name = format!("{}, {}", comparison.noise, comparison.loss);
@@ -27,7 +27,7 @@ fn lost_samples_bias_neither_variance_nor_coefficients_and_keep_the_longest_aver
 
 #[test]
 fn without_the_correction_the_benchmark_would_see_the_bias() {
-    let table = LossPlan { records: 8, samples: 1 << 16, first_seed: 9_000, jobs: 2 }.run(|_, _| ());
+    let table = LossPlan { records: 8, samples_log2: 16, first_seed: 9_000, jobs: 2 }.run(|_, _| ());
     let white =
         table.comparisons.iter().find(|comparison| comparison.loss == LossPattern::Random(0.05)).expect("white, 5 %");
     let text = tables::of("losses", &serde_json::to_value(&table).expect("JSON"));

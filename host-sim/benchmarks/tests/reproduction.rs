@@ -17,7 +17,7 @@ fn the_slope_method_is_biased_by_the_other_terms_and_the_fit_is_not() {
             let error = errors[term];
             assert!((error.bias - expected).abs() < 1e-3 + 4.0 * error.scatter / root, "term {term}: {result:#?}");
         }
-        // Of 16 intervals, 11 or fewer cover once in 1000 cases.
+        // 11 or fewer of 16 intervals cover once in 1000 cases.
         assert!(result.covered[term] * SEEDS as f64 > 11.0, "term {term}: {result:#?}");
     }
     // N²/τ, 0.441·B² and K²τ/3 sum to 1.60 times 0.664·B at 40 s and 80 s, and to 1.23 times K·√(τ/3) at 160 s.

@@ -14,7 +14,7 @@ pub(crate) fn of_effect(effect: &Effect) -> String {
     displayed(of_kind(effect))
 }
 
-/// That of the channel that shows a finding most clearly.
+/// The evidence in the channel that shows a finding most clearly.
 pub(crate) fn of_finding(finding: &Finding) -> String {
     let evidence = of_kind(&finding.effect);
     match finding.channels.len() {

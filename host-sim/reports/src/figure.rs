@@ -111,13 +111,15 @@ pub(crate) fn story(report: &Report) -> Option<Plot> {
     let gains = errors.iter().filter(|(_, [before, after])| before > after);
     let shown = gains
         .max_by(|(_, a), (_, b)| (a[0] / a[1]).total_cmp(&(b[0] / b[1])))
-        .or_else(|| errors.iter().max_by(|(_, a), (_, b)| a[0].total_cmp(&b[0])));
+        .or_else(|| errors.iter().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])));
     shown.map(|&(channel, errors)| channel::story_plot(report, channel, errors))
 }
 
-/// The picture of the first finding, or else of the curves beside the data sheet.
+/// The picture of the first finding that has one beside the Allan deviation, or else the curves beside the data sheet.
 pub(crate) fn strongest(report: &Report) -> Option<Plot> {
-    let first = summary::finding_order(report).first().and_then(|&index| evidence(report, index, 1));
+    let pictures = (1..).zip(summary::finding_order(report));
+    let first =
+        pictures.filter_map(|(number, index)| evidence(report, index, number)).find(|plot| plot.panels.len() == 1);
     let plot = first.or_else(|| overviews(report).into_iter().next())?;
     Some(Plot { id: "strongest".to_owned(), ..plot })
 }
@@ -148,17 +150,18 @@ fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
         lines.push(data_sheet_line(sheet, &taus));
     }
     let panel = Panel::logarithmic(TAU, &deviation_label(&first.unit), lines, frames([300.0])[0]);
-    let each: Vec<String> = channels
-        .iter()
-        .filter_map(|channel| {
-            let lowest = channel.curve.iter().min_by(|a, b| a.adev.total_cmp(&b.adev))?;
-            let (tau, deviation) = (span(lowest.tau_s), quantity(lowest.adev, &channel.unit));
-            Some(format!("{} is lowest at {tau} with {deviation}", channel_name(channel)))
-        })
-        .collect();
+    let lowest = |channel: &&ChannelReport| {
+        let lowest = channel.curve.iter().min_by(|a, b| a.adev.total_cmp(&b.adev))?;
+        let (tau, deviation) = (span(lowest.tau_s), quantity(lowest.adev, &channel.unit));
+        // A curve that still falls at its end has no minimum.
+        let is_minimum = channel.curve.last().is_some_and(|last| last.n > lowest.n);
+        is_minimum.then(|| format!("{} {deviation} at {tau}", channel_name(channel)))
+    };
+    let lowest: Vec<String> = channels.iter().filter_map(lowest).collect();
+    let lowest = if lowest.is_empty() { String::new() } else { format!(" Lowest: {}.", lowest.join(", ")) };
     let title =
         format!("Allan deviation of the {name}{}", if sheet.is_some() { ", beside the data sheet" } else { "" });
-    let description = format!("Points with 95 % bounds: measured. Lines: models. {}.", each.join("; "));
+    let description = format!("Points: measured, with 95 % bounds. Lines: models.{lowest}");
     Some(Plot::new(format!("overview-{name}"), title, description, [panel]))
 }
 

@@ -116,9 +116,12 @@ pub(crate) fn largest(shares: &BTreeMap<String, f64>) -> f64 {
 /// Largest share of the variance, that around a minute, and the second half's confirmation; empty if unknown.
 fn weight(finding: &Finding) -> String {
     let percent = |share: f64| (share >= 0.5).then(|| significant(share, 2));
-    let minute = percent(largest(&finding.minute_percent)).map(|share| format!(", {share} % around τ = 1 min"));
-    let share = percent(largest(&finding.share_percent))
-        .map(|share| format!("up to {share} % of σ²{}", minute.unwrap_or_default()));
+    let [minute, share] = [&finding.minute_percent, &finding.share_percent].map(|shares| percent(largest(shares)));
+    let share = share.map(|share| match minute {
+        None => format!("up to {share} % of σ²"),
+        Some(minute) if minute == share => format!("{share} % of σ² around τ = 1 min"),
+        Some(minute) => format!("up to {share} % of σ², {minute} % around τ = 1 min"),
+    });
     let held = match finding.validated {
         Validation::Yes => Some("the second half confirms it".to_owned()),
         Validation::No => Some("the second half does not confirm it".to_owned()),
@@ -269,11 +272,11 @@ fn template(finding: &Finding, shown: &[ShownEffect]) -> Template {
         ),
         Effect::LevelStep(_) => look(
             "The bias stepped at {time:moment}: {size:each}.",
-            "Look for a shock, a changed supply or a touched cable at that time|; cut the record there.",
+            "Look for a shock, a changed supply or a touched cable at {time:moment}|; cut the record there.",
         ),
         Effect::LevelChange(_) => look(
             "From {time:moment} on the noise is {ratio:each} times as large| as before|.",
-            "Look for what was switched on or off at that time|; N is that of both levels together: cut the record there.",
+            "Look for what was switched on or off at {time:moment}|; N is that of both levels together: cut the record there.",
         ),
         Effect::WanderingLevel(_) => look(
             "The noise grows and falls by {deviation:each}| (1 σ)|, within {time_constant}.",
@@ -322,10 +325,10 @@ fn template(finding: &Finding, shown: &[ShownEffect]) -> Template {
             "Isolate the part from vibration, or compensate with the variance of the acceleration|.{limits}",
         ),
         Effect::AngleQuantization(_) => look("Rounding shows: a quantization noise of {value:each}.", FINER),
-        Effect::EffectiveLsb(_) => look("Rounding shows: only every value {step:each} apart occurs.", FINER),
+        Effect::EffectiveLsb(_) => look("Rounding shows: the values are {step:each} apart.", FINER),
         Effect::NoiseBelowCount(_) => look(
             "The noise is smaller than a count|: the samples repeat one value and hide what is below it|.",
-            "Take no coefficient from the short averaging times|; use a smaller range, or add dither.",
+            "Read the part with more bits or in a smaller range|, or add dither; N is partly that of the rounding.",
         ),
         Effect::MissingCodes(of) => look(
             format!("The converter never gives {} of its codes|, which are {{spacing:each}} apart|.", of.codes),
@@ -377,7 +380,7 @@ fn template(finding: &Finding, shown: &[ShownEffect]) -> Template {
         ),
         Effect::ClockDeviation(of) if of.change.is_some() => look(
             "The sample clock changes its rate| from {rate_before_hz} to {rate_after_hz}| after {change_time:moment}.",
-            "Look for what reset or set the part or the reader at this time|; the averaging times are those of the mean rate.",
+            "Look for what reset or set the part or the reader at {change_time:moment}|; the averaging times are those of the mean rate.",
         ),
         Effect::ClockDeviation(of) => {
             let nominal = quantity_digits(of.nominal_hz, "Hz", 4);

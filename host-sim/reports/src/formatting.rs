@@ -44,7 +44,7 @@ pub fn missing_samples(missing: &MissingSamples) -> String {
     parts.join("; ")
 }
 
-/// Such as `2 h 46 min 40 s`; four digits below a minute.
+/// A duration such as `2 h 46 min 40 s`; four digits below a minute.
 pub fn duration(seconds: f64) -> String {
     // Exact up to 2^53.
     if !(59.5..9.0e15).contains(&seconds) {
@@ -90,7 +90,7 @@ pub fn words(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// Without its unit: `frequency_hz` becomes `frequency`, `value` becomes nothing.
+/// The name of a parameter without its unit: `frequency_hz` becomes `frequency`, `value` becomes nothing.
 pub fn parameter_name(name: &str) -> String {
     let bare = name.strip_suffix("_hz").or(name.strip_suffix("_s")).unwrap_or(name);
     match bare {

@@ -2,21 +2,21 @@
 
 use crate::coefficient_notes::coefficient_notes;
 use crate::coefficients::KINDS;
-use crate::curve_numbers::curve_numbers;
 use crate::evidence;
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
-    count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name, percent,
-    recording_advice, words, worst_deviations, wrap,
+    count, duration, filter_consistency, interval, missing_samples, number, recording_advice, words, worst_deviations,
+    wrap,
 };
+use crate::report_tables::{self, ReportTable};
 use crate::rounding::{NONE, Scale, p_value, parameter_magnitude, quantity_digits, unit};
 use crate::summary;
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::assessment::navigation::CALIBRATION_S;
-use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
 use noise_analysis::report::{
-    ChannelEffect, ChannelReport, ModelErrorReport, Parameter, Report, SlopeMethodReport, SlopeMethodValue, TermReport,
+    ChannelEffect, ChannelReport, Parameter, Report, SlopeMethodReport, SlopeMethodValue, TermReport,
 };
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -122,12 +122,12 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}\n", wrap(&format!("Missing: {missing}."), WIDTH.into()))?;
     }
 
-    writeln!(out, "{}", coefficient_table(channel))?;
+    writeln!(out, "{}", framed(coefficients(channel)))?;
     let same = channel.after == channel.before;
     if !same {
-        writeln!(out, "{}", term_table(&channel.after.terms))?;
+        writeln!(out, "{}", framed(report_tables::terms("with the effects", &channel.after.terms)))?;
     }
-    writeln!(out, "{}", error_table(channel))?;
+    writeln!(out, "{}", framed(report_tables::errors(channel)))?;
     if channel.after.unseen.rms_percent.is_some() {
         writeln!(out, "{}", wrap(&explanation::model(channel), WIDTH.into()))?;
     }
@@ -148,22 +148,23 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     if channel.curve.is_empty() {
         return writeln!(out, "The record is too short for a point of the curve.");
     }
-    writeln!(out, "{}", curve_table(channel))
+    writeln!(out, "{}", framed(report_tables::curve(channel)))
 }
 
-/// In a frame; `left` columns are aligned left, the others right.
-fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+/// In a frame.
+fn framed(ReportTable { headings, rows, text_columns }: ReportTable) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED).apply_modifier(modifiers::UTF8_ROUND_CORNERS);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
-    table.set_header(header.to_vec()).add_rows(rows);
-    for column in table.column_iter_mut().skip(left) {
+    table.set_header(headings).add_rows(rows);
+    for column in table.column_iter_mut().skip(text_columns) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table
 }
 
-fn coefficient_table(channel: &ChannelReport) -> Table {
+/// N, B and K by the slope method and by the fit.
+fn coefficients(channel: &ChannelReport) -> ReportTable {
     let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
     let terms = &channel.before.terms;
     let classical = KINDS.into_iter().zip([angle_random_walk, bias_instability, rate_random_walk]);
@@ -185,53 +186,16 @@ fn coefficient_table(channel: &ChannelReport) -> Table {
         let fit = fit.map_or_else(|| NONE.to_owned(), |fit| scale.estimate(&fit));
         vec![words(kind), scale.unit, by_slope, found, fit]
     };
-    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit, 95 % interval"];
-    table(&header, 2, classical.chain(others).map(row))
-}
-
-fn term_table(terms: &[TermReport]) -> Table {
-    let rows = terms.iter().flat_map(|term| {
-        term.parameters().into_iter().map(move |(name, parameter)| {
-            let scale = Scale::new([parameter_magnitude(&parameter)], &parameter.unit);
-            let fit = scale.estimate(&parameter);
-            vec![words(term.kind()), parameter_name(name), scale.unit, fit]
-        })
-    });
-    let header = ["with the effects", "parameter", "unit", "fit, 95 % interval"];
-    table(&header, 3, rows)
-}
-
-fn error_table(channel: &ChannelReport) -> Table {
-    let after = if summary::is_fitted_to_later_quarter(channel) { "after, later quarter" } else { "after" };
-    // Fitted, and unseen.
-    let row = |name: String, errors: [Option<&ModelErrorReport>; 2]| {
-        let cells = |text: &dyn Fn(&ModelErrorReport) -> String| errors.map(|of| of.map_or_else(String::new, text));
-        let [rms, deviance] = [cells(&|of| percent(of.rms_percent)), cells(&|of| optional(of.deviance_per_point))];
-        let worst = cells(&|of| optional(of.worst_sigma));
-        [name].into_iter().chain(rms).chain(deviance).chain(worst).collect::<Vec<String>>()
-    };
-    let models = [("before", &channel.before), (after, &channel.after)].into_iter().flat_map(|(name, model)| {
-        let excluding = model.unseen_excluding.as_ref();
-        let excluding = excluding.map(|error| row(format!("{name}, excluding"), [None, Some(error)]));
-        [row(name.to_owned(), [&model.fitted, &model.unseen].map(Some))].into_iter().chain(excluding)
-    });
-    let own_curve = row("first half's curve".to_owned(), [None, Some(&channel.first_half_curve)]);
-    let rows = models.chain([own_curve]);
-    let header = ["model error", "rms fitted", "unseen", "deviance fitted", "unseen", "worst σ fitted", "unseen"];
-    table(&header, 1, rows)
-}
-
-fn curve_table(channel: &ChannelReport) -> Table {
-    let (headings, rows) = curve_numbers(channel);
-    table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
+    let headings = ["coefficient", "unit", "by slope", "slope found, s", "fit, 95 % interval"];
+    ReportTable::new(&headings, 2, classical.chain(others).map(row))
 }
 
 fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
-        writeln!(out, "{}", unit_table(&assessment.coefficients))?;
+        writeln!(out, "{}", framed(report_tables::units(&assessment.coefficients)))?;
     }
     if !assessment.drift.is_empty() {
-        writeln!(out, "{}", drift_table(&assessment.drift))?;
+        writeln!(out, "{}", framed(report_tables::drift(&assessment.drift)))?;
     }
     if let Some(innovations) = &assessment.innovations {
         let text = format!(
@@ -246,27 +210,4 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
         writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
     }
     assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
-}
-
-fn unit_table(coefficients: &[Coefficient]) -> Table {
-    let row = |coefficient: &Coefficient| {
-        let scale = Scale::new([parameter_magnitude(&coefficient.value)], &coefficient.value.unit);
-        let sense = if coefficient.discrete { "discrete, of samples" } else { "continuous" };
-        let value = scale.estimate(&coefficient.value);
-        vec![words(&coefficient.kind), sense.to_owned(), scale.unit, value]
-    };
-    let header = ["in other units", "", "unit", "value, 95 % interval"];
-    table(&header, 3, coefficients.iter().map(row))
-}
-
-fn drift_table(drifts: &[NavigationDrift]) -> Table {
-    let row = |drift: &NavigationDrift| {
-        let observed = drift.observed.as_ref();
-        let scale = Scale::new([drift.predicted].into_iter().chain(observed.map(parameter_magnitude)), &drift.unit);
-        let predicted = scale.number(drift.predicted, 3);
-        let observed = observed.map_or_else(|| "too short".to_owned(), |observed| scale.estimate(observed));
-        vec![duration(drift.seconds), scale.unit, predicted, observed]
-    };
-    let header = ["error after", "unit", "predicted", "unseen half, 95 % interval"];
-    table(&header, 1, drifts.iter().map(row))
 }

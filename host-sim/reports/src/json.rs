@@ -31,7 +31,7 @@ struct FindingJson<'a> {
 }
 
 impl<'a> ReportJson<'a> {
-    /// With the record of the reading, if there is one.
+    /// The JSON with the record of the reading, if there is one.
     #[must_use]
     pub fn new(report: &'a Report, reading: Option<&'a ReadingRecord>) -> Self {
         let finding = |(index, finding): (usize, &'a Finding)| {

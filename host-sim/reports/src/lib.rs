@@ -3,7 +3,6 @@
 pub mod coefficient_notes;
 mod coefficients;
 pub mod comparison;
-mod curve_numbers;
 mod evidence;
 mod explanation;
 pub mod export;
@@ -17,6 +16,7 @@ pub mod live;
 pub mod page;
 mod part_note;
 pub mod reading;
+mod report_tables;
 pub mod rounding;
 pub mod rows;
 pub mod saved_report;

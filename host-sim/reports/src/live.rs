@@ -92,7 +92,7 @@ impl LiveView {
         frame.render_widget(Paragraph::new(status_text).style(reversed), status);
     }
 
-    /// Without the data sheet's rows on a low screen.
+    /// The tables, without the data sheet's rows on a low screen.
     fn table_text(&self, area: Rect, in_colour: bool) -> Vec<Line<'static>> {
         let columns = usize::from(area.width).clamp(TABLE_COLUMNS, 120);
         let mut lines = Vec::new();

@@ -13,6 +13,7 @@ use crate::formatting::{
 };
 use crate::live::LiveView;
 use crate::reading::ReadingRecord;
+use crate::report_tables;
 use crate::rounding::{bounded_quantity, p_value, unit};
 use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -103,9 +104,8 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
                 }
                 @if is_whole { (contents(report)) }
                 main {
-                    @if let Some(sentence) = reading.and_then(ReadingRecord::incomplete) { p { strong { (sentence) } } }
                     div.first {
-                        (verdict(report))
+                        (verdict(report, reading))
                         section.pictures aria-label="The two pictures that carry the answer" {
                             @if let Some(plot) = figure::story(report) { (drawing(&plot)) }
                             @if let Some(plot) = figure::strongest(report) { (drawing(&plot)) }
@@ -161,10 +161,11 @@ fn contents(report: &Report) -> Markup {
 }
 
 /// Trust, N, B and K, next steps.
-fn verdict(report: &Report) -> Markup {
+fn verdict(report: &Report, reading: Option<&ReadingRecord>) -> Markup {
     let answer = summary::answer(report);
     html! {
         section.verdict id="answer" aria-label="Answer" {
+            @if let Some(sentence) = reading.and_then(ReadingRecord::incomplete) { p.warning { strong { (sentence) } } }
             @if let Some((first, others)) = answer.split_first() {
                 p { strong { (unparted(first)) } " " (unparted(&others.join(" "))) }
             }
@@ -173,7 +174,8 @@ fn verdict(report: &Report) -> Markup {
             @let notes = [coefficient_notes(report), summary::record_in_detail(report), summary::part_notes(report)].concat();
             @let conditions = summary::conditions(report);
             @if !notes.is_empty() || !conditions.is_empty() {
-                details {
+                // Without a finding there is room for it.
+                details open[report.findings.is_empty()] {
                     summary { "More about the record" }
                     @for text in notes { p { (unparted(&text)) } }
                     @if !conditions.is_empty() { p { "Conditions: " (conditions.join("; ")) "." } }
@@ -225,7 +227,7 @@ fn disagreements(report: &Report) -> Markup {
     }
 }
 
-/// With values for pointer and keyboard.
+/// A figure with its values for pointer and keyboard.
 fn drawing(plot: &Plot) -> Markup {
     html! {
         figure id=(plot.id) tabindex="0" aria-label={ (plot.title) ". Arrow keys read the values." } {
@@ -330,11 +332,11 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
             div.tables {
                 div {
                     h3 { "Model, fitted to the whole record" }
-                    (tables::terms(&channel.refitted))
+                    (tables::laid_out(&report_tables::terms("term", &channel.refitted.terms)))
                 }
                 div {
                     h3 { "Error, before and after" }
-                    (tables::errors(channel))
+                    (tables::laid_out(&report_tables::errors(channel)))
                     @let far = worst_deviations(channel);
                     @if !far.is_empty() { ul { @for text in &far { li.warning { (text) "." } } } }
                     @let own: Vec<(usize, &Finding)> = (1..).zip(summary::finding_order(report))
@@ -356,15 +358,15 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
             h3 { "What the model is good for" }
             (assessment(&channel.assessment))
             h3 { "The curve in numbers" }
-            (tables::curve(channel))
+            (tables::laid_out(&report_tables::curve(channel)))
         }
     }
 }
 
 fn assessment(assessment: &Assessment) -> Markup {
     html! {
-        @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
-        @if !assessment.drift.is_empty() { (tables::drift(&assessment.drift)) }
+        @if !assessment.coefficients.is_empty() { (tables::laid_out(&report_tables::units(&assessment.coefficients))) }
+        @if !assessment.drift.is_empty() { (tables::laid_out(&report_tables::drift(&assessment.drift))) }
         ul {
             @if let Some(innovations) = &assessment.innovations {
                 li { b { "Kalman filter of the model" } ", unseen half: " (filter_consistency(innovations)) "."

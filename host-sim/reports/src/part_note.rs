@@ -9,7 +9,7 @@ const NOT_CORRELATED: &str =
     "No low-pass filter found: consecutive samples are uncorrelated, so N is valid from one sample on.";
 const SCALES: &str = "Every τ and N scale with it.";
 
-/// For the page, `--full` and the JSON.
+/// The sentence of the page, `--full` and the JSON.
 pub(crate) fn sentence(note: &PartNote) -> String {
     match note {
         PartNote::NotSought => "A quick report does not look for the part's clock and filter.".to_owned(),
@@ -67,7 +67,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
     }
 }
 
-/// In short, for the screen; a stated rate only if it contradicts the nominal clock.
+/// Shorter sentences for the screen; a stated rate only if it contradicts the nominal clock.
 pub(crate) fn in_short(notes: &[PartNote]) -> Vec<String> {
     let of = |note: &PartNote| match note {
         PartNote::CountsTooCoarse => {

@@ -54,7 +54,7 @@ pub struct ReadingOptions<'a> {
 }
 
 impl ReadingOptions<'_> {
-    /// As typed on the command line.
+    /// The options as typed on the command line.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
@@ -74,7 +74,7 @@ impl ReadingOptions<'_> {
 }
 
 impl ReadingRecord {
-    /// For the screen, if the reading ended early.
+    /// A sentence if the reading ended early.
     #[must_use]
     pub fn incomplete(&self) -> Option<String> {
         let why = self.damage.clone().unwrap_or_else(|| "the reading was stopped".to_owned());

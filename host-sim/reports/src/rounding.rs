@@ -15,7 +15,7 @@ pub(crate) fn extremes(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), of| (of.min(low), of.max(high)))
 }
 
-/// As printed: `deg/sqrt(s)` becomes `°/√s`.
+/// The printed unit: `deg/sqrt(s)` becomes `°/√s`.
 pub fn unit(name: &str) -> String {
     let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
     let powers = [("^2", "²"), ("^3", "³")];
@@ -64,7 +64,7 @@ fn at_place(value: f64, half_width: f64) -> f64 {
     value
 }
 
-/// With 95 % bounds: `2.43 ± 0.01`, `24.3 (21 … 27)`, `< 190` for an upper bound, `–` without an estimate.
+/// An estimate with 95 % bounds: `2.43 ± 0.01`, `24.3 (21 … 27)`, `< 190` for an upper bound, `–` without an estimate.
 #[must_use]
 pub fn estimate(value: f64, low: f64, high: f64) -> String {
     if !value.is_finite() {
@@ -95,7 +95,7 @@ pub(crate) fn is_upper_bound(value: f64, low: f64) -> bool {
     low <= 0.0 && value >= 0.0
 }
 
-/// Without an exponent.
+/// A number with `digits` significant digits and no exponent.
 #[must_use]
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
@@ -114,20 +114,20 @@ pub fn significant(value: f64, digits: i32) -> String {
     fixed(value, usize::try_from(digits - 1 - exponent).unwrap_or(0))
 }
 
-/// With sign: `+2.1`, `−3.6`.
+/// A number with its sign: `+2.1`, `−3.6`.
 #[must_use]
 pub fn signed(value: f64, digits: i32) -> String {
     format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), digits))
 }
 
-/// Without trailing zeros: `100`, `8`, `91.4`.
+/// A number without trailing zeros: `100`, `8`, `91.4`.
 #[must_use]
 pub fn plain(value: f64, digits: i32) -> String {
     let text = significant(value, digits);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Of a column of any magnitude: `100`, `−0.0413`, `−3.92e−4`. An integer has all of its digits.
+/// A number of a column of any magnitude: `100`, `−0.0413`, `−3.92e−4`. An integer has all of its digits.
 #[must_use]
 pub fn compact(value: f64, digits: i32) -> String {
     let is_usual = !value.is_finite() || (1e-3..1e7).contains(&value.abs());
@@ -152,7 +152,7 @@ pub fn probability(p: f64) -> String {
     }
 }
 
-/// In a sentence: `p = 0.21`, `p < 0.001`.
+/// A probability in a sentence: `p = 0.21`, `p < 0.001`.
 #[must_use]
 pub fn p_value(p: f64) -> String {
     let text = probability(p);
@@ -194,7 +194,7 @@ pub fn quantity(value: f64, name: &str) -> String {
     quantity_digits(value, name, 2)
 }
 
-/// With `digits` significant digits.
+/// A quantity with `digits` significant digits.
 #[must_use]
 pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
     if !value.is_finite() {
@@ -215,14 +215,14 @@ pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
     }
 }
 
-/// With the digits of its interval, without the interval.
+/// A parameter with the digits of its interval, without the interval.
 #[must_use]
 pub fn rounded_quantity(parameter: &Parameter) -> String {
     let &Parameter { value, low, high, ref unit } = parameter;
     quantity_digits(value, unit, supported_digits(value, low, high))
 }
 
-/// With its interval: `20.70 ± 0.10 Hz`.
+/// A parameter with its interval: `20.70 ± 0.10 Hz`.
 #[must_use]
 pub fn bounded_quantity(parameter: &Parameter) -> String {
     let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);

@@ -38,7 +38,7 @@ pub struct ReportRow {
     pub high: Option<f64>,
     /// Such as `deg/sqrt(s)`.
     pub unit: Option<String>,
-    /// For a finding on the second half: `yes`, `no` or `untestable`.
+    /// Test of a finding on the second half: `yes`, `no` or `untestable`.
     pub validated: Option<String>,
     /// Number of the finding in the report, from 0.
     pub finding: Option<u64>,

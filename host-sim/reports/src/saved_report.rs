@@ -41,7 +41,7 @@ pub struct SavedChannel {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedModel {
     pub terms: Vec<SavedTerm>,
-    /// In the channel's unit, at each point of the curve.
+    /// The model's deviation in the channel's unit, at each point of the curve.
     pub adev: Vec<f64>,
 }
 

@@ -135,7 +135,7 @@ pub(crate) fn coefficients_in_short(report: &Report, channel: &str) -> [String; 
     })
 }
 
-/// For channels at `sample_rate_hz`, without a data sheet.
+/// Tables of channels at `sample_rate_hz`, without a data sheet.
 #[must_use]
 pub fn tables_of_channels(channels: &[ChannelCoefficients], sample_rate_hz: f64) -> Vec<CoefficientTable> {
     tables_of(channels, sample_rate_hz, |_| None)
@@ -403,7 +403,7 @@ fn unseen_half(report: &Report) -> Option<String> {
 /// Samples for a correlation of 0.15 at five standard errors.
 const SAMPLES_FOR_FILTER: u64 = 1000;
 
-/// Without "no filter" if none could show, or if some channels have one.
+/// The notes, without "no filter" if none could show or if some channels have one.
 fn told_notes(report: &Report) -> Vec<PartNote> {
     let is_filter = |finding: &Finding| matches!(finding.effect, Effect::OutputFilter(_) | Effect::LowPassFilter(_));
     if inertial(report).next().is_none() {
@@ -420,7 +420,7 @@ pub fn part_notes(report: &Report) -> Vec<String> {
     told_notes(report).iter().map(part_note::sentence).collect()
 }
 
-/// For the screen: fewer notes, nothing of its table.
+/// Sentences for the screen: fewer notes, nothing of its table.
 #[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     let LengthAdvice { known, longer, .. } = length_advice(report);
@@ -490,18 +490,23 @@ pub(crate) fn unexplained_in_short(report: &Report) -> Option<String> {
     Some(counted(departures.len(), &largest.text()))
 }
 
-/// Number and most serious of the contradictions; `None` without any.
+/// Number of the contradictions and the largest of them; `None` without any.
 pub(crate) fn contradictions_in_short(report: &Report) -> Option<String> {
-    let contradictions = contradictions(report);
-    let first = contradictions.first()?;
-    Some(counted(contradictions.len(), first.split(" (").next().unwrap_or(first)))
+    let (far, unsure) = (far_off(report), claiming_too_much(report));
+    let largest = far.iter().max_by(|a, b| a.logarithm.total_cmp(&b.logarithm)).map(|far| far.place.clone());
+    let filter = || {
+        let of = if let [one] = &unsure[..] { channel_list([one]) } else { format!("{} channels", unsure.len()) };
+        format!("a Kalman filter of {of} claims too small an error")
+    };
+    let text = largest.or_else(|| (!unsure.is_empty()).then(filter))?;
+    Some(counted(far.len() + usize::from(!unsure.is_empty()), &text))
 }
 
 fn counted(all: usize, text: &str) -> String {
     if all == 1 { text.to_owned() } else { format!("{all} places; {text}") }
 }
 
-/// By the file if examined, else without a motion.
+/// The longest stretch at rest: of the whole file if it was examined, else of the record.
 #[must_use]
 pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
     let stretches = || inertial(report).flat_map(|channel| &channel.at_rest);
@@ -595,7 +600,7 @@ fn relative_error(of: &Parameter) -> f64 {
     (of.high - of.value).max(of.value - of.low) / of.value
 }
 
-/// For the coefficient `kind`, with the channels.
+/// The knowledge of the coefficient `kind` in each channel.
 fn knowledge(report: &Report, kind: &str) -> Vec<(String, Knowledge)> {
     let of = |channel: &ChannelReport| {
         let value = coefficient(channel, kind)?;
@@ -867,9 +872,17 @@ fn related_line(report: &Report, finding: &Finding) -> Option<String> {
     Some(format!("a line of {other} moves with it, {at}"))
 }
 
-/// One text each, the most serious first.
-#[must_use]
-pub fn contradictions(report: &Report) -> Vec<String> {
+/// A point of the unseen half farther from the model than chance explains.
+struct FarOff {
+    sigma: f64,
+    /// Absolute logarithm of measured over modelled σ.
+    logarithm: f64,
+    /// Channel, averaging time and departure in words.
+    place: String,
+}
+
+/// One of each channel, the least probable first.
+fn far_off(report: &Report) -> Vec<FarOff> {
     let channels = inertial(report).count() as f64;
     let is_far_off = |channel: &ChannelReport, sigma: f64| {
         let fitted = if is_fitted_to_later_quarter(channel) { FITTED_TO_QUARTER } else { FITTED_TO_HALF };
@@ -886,16 +899,31 @@ pub fn contradictions(report: &Report) -> Vec<String> {
         } else {
             format!("{} times", significant(times, 2))
         };
-        let (name, errors) = (channel_name(channel), significant(sigma, 2));
-        Some((sigma, format!("{name} at τ = {tau}: σ is {size} the model ({errors} standard errors)")))
+        let place = format!("{} at τ = {tau}: σ is {size} the model", channel_name(channel));
+        Some(FarOff { sigma, logarithm: times.ln().abs(), place })
     };
-    let mut far: Vec<(f64, String)> = inertial(report).filter_map(far).collect();
-    far.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut far: Vec<FarOff> = inertial(report).filter_map(far).collect();
+    far.sort_by(|a, b| b.sigma.total_cmp(&a.sigma));
+    far
+}
+
+/// Channels in which a Kalman filter with the model is surer of itself than chance explains.
+fn claiming_too_much(report: &Report) -> Vec<&String> {
+    let channels = inertial(report).count() as f64;
     let is_unsure = |of: &Innovations| channels * of.chance_of_small_claim() < CHANCE;
-    let unsure = |channel: &ChannelReport| channel.assessment.innovations.as_ref().is_some_and(is_unsure);
-    let unsure = inertial_names(report, unsure)
-        .map(|names| format!("a Kalman filter with the models of {names} would claim a smaller error than it has"));
-    far.into_iter().map(|(_, text)| text).chain(unsure).collect()
+    let unsure = inertial(report).filter(|channel| channel.assessment.innovations.as_ref().is_some_and(is_unsure));
+    unsure.map(|channel| &channel.name).collect()
+}
+
+/// One text each, the least probable first.
+#[must_use]
+pub fn contradictions(report: &Report) -> Vec<String> {
+    let standard_errors = |far: &FarOff| format!("{} ({} standard errors)", far.place, significant(far.sigma, 2));
+    let unsure = claiming_too_much(report);
+    let filter = (!unsure.is_empty()).then(|| {
+        format!("a Kalman filter with the models of {} claims a smaller error than it has", channel_list(unsure))
+    });
+    far_off(report).iter().map(standard_errors).chain(filter).collect()
 }
 
 /// Advice in the order of the findings, with their numbers; rest comes first.
@@ -923,14 +951,9 @@ pub(crate) fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
 /// Most pieces of advice by findings.
 const MOST_STEPS: usize = 3;
 
-/// The most useful first.
+/// Advice with the numbers of its findings: `Look for a fan, a motor or the mains (2, 5).`
 #[must_use]
-pub fn next_steps(report: &Report) -> Vec<String> {
-    advice(report).into_iter().map(|(step, _)| step).chain(for_filter(report)).collect()
-}
-
-/// With numbers of findings: `Look for a fan, a motor or the mains (2, 5).`
-pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
+pub fn numbered_steps(report: &Report) -> Vec<String> {
     let numbered = |(step, numbers): (String, Vec<usize>)| {
         let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
         format!("{} ({}).", step.trim_end_matches('.'), numbers.join(", "))

@@ -5,14 +5,20 @@ use super::published_gyro::{
     INTERVALS, OCTAVES, RATE_HZ, SAMPLES, TRUTH, allan_curve, deviations, fitted_terms, simulate_counts,
     slope_coefficients, true_model,
 };
+use crate::arguments::MOST_RECORDINGS;
 use allan_core::{AllanPoint, Cascade, Model, NoiseTerm, fit::fit};
+use clap::{Args, value_parser};
 use serde::Serialize;
 use std::ops::RangeInclusive;
 
-/// Seeds of the simulated hours.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Repeat the published characterisation on simulated hours: slope method beside the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct Reproduction {
+    /// Hours to simulate; a scatter needs two.
+    #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(2..=MOST_RECORDINGS))]
     pub seeds: u64,
+    /// Seed of the first.
+    #[arg(long, default_value_t = 1)]
     pub first_seed: u64,
 }
 

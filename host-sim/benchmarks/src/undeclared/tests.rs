@@ -235,7 +235,7 @@ fn a_recording_depends_on_its_seed_only_and_no_seed_is_used_twice() {
     let plan = |sealed| UndeclaredPlan {
         kinds: EffectKind::ALL.to_vec(),
         per_kind: 40,
-        empty: 200,
+        nothing: 200,
         pairs: 200,
         triples: 50,
         outside: 20,
@@ -449,7 +449,7 @@ fn a_small_run_does_not_depend_on_the_number_of_jobs() {
     let plan = |jobs| UndeclaredPlan {
         kinds: vec![EffectKind::DroppedSamples, EffectKind::Spikes],
         per_kind: 1,
-        empty: 1,
+        nothing: 1,
         pairs: 1,
         triples: 0,
         outside: 0,

@@ -32,7 +32,7 @@ pub enum ExportError {
         channel: String,
         term: String,
         parameter: String,
-        /// As the report has it.
+        /// The value in the report.
         value: String,
     },
     #[error(

@@ -49,18 +49,18 @@ fn of_channel<const PANELS: usize>(
     Plot::new(format!("{}-{id}", channel.name), format!("{} · {title}", channel_name(channel)), description, panels)
 }
 
-/// The measured curve, both models fitted to the first half, and their errors on the second.
+/// The measured curve, the model of the first half and its error on the second; beside it the model without effects, if these lower the
+/// error.
 pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
     let models = summary::models(channel);
-    let first = if is_lowered { "before: N, B, K" } else { "model: N, B, K" };
-    let mut lines = vec![
-        model_line(channel, models[0], first, Look::Before),
-        measured(channel, Look::Measured, "measured, whole record"),
-    ];
+    let mut lines = Vec::new();
     if is_lowered {
-        lines.insert(1, model_line(channel, models[1], "after: with effects", Look::Model));
+        lines.push(model_line(channel, models[0], "before: N, B, K", Look::Before));
     }
+    let name = if is_lowered { "after: with effects" } else { "model of the first half" };
+    lines.push(model_line(channel, models[1], name, Look::Model));
+    lines.push(measured(channel, Look::Measured, "measured, whole record"));
     let unseen = deviations(channel, &channel.unseen_adev);
     if !unseen.is_empty() {
         lines.push(Line::new("second half, not seen by the fit", Look::Reference, unseen).dotted());
@@ -76,12 +76,12 @@ pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, afte
     let (title, description) = if is_lowered {
         (
             format!("{name}: σ is off by {before} % without what was found, by {after} % with it"),
-            "Both models are fitted to the first half; the errors are those on the second, which they had not seen.",
+            "Both models are fitted to the first half. Their errors are those on the second, up to an eighth of its length.",
         )
     } else {
         (
-            format!("{name}: σ is off by {before} %"),
-            "The model is fitted to the first half; the error is that on the second, which it had not seen. No effect lowers it.",
+            format!("{name}: σ is off by {after} %"),
+            "The model is fitted to the first half. Its error is that on the second, up to an eighth of its length.",
         )
     };
     Plot::new("story", title, description, [Panel::new(across, up, lines)])

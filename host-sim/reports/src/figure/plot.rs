@@ -17,7 +17,7 @@ const BELOW: f64 = 48.0;
 /// Space above the first panel for a tick's label.
 const ABOVE: f64 = 10.0;
 
-/// How the style sheet draws a line, in the order of its colours.
+/// The style of a line, in the order of the colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Look {
     Measured,
@@ -73,7 +73,7 @@ pub(super) struct Line {
     pub in_legend: bool,
     /// Text beside an end of the line; empty without.
     pub mark: String,
-    /// At the right end, not the left one.
+    /// The mark is at the right end.
     pub mark_is_right: bool,
 }
 
@@ -206,7 +206,7 @@ impl Plot {
         self.svg(0.0, &ground)
     }
 
-    /// For the page, whose legend stands beside it.
+    /// The drawing for the page, whose legend stands beside it.
     pub(crate) fn drawing(&self) -> Markup {
         self.svg(self.top() - ABOVE, &html! {})
     }
@@ -277,13 +277,13 @@ impl Panel {
         Self { across, up, lines, places: Vec::new() }
     }
 
-    /// With logarithmic axes around all `lines`.
+    /// A panel with logarithmic axes around all `lines`.
     pub(super) fn logarithmic(across: &str, up: &str, lines: Vec<Line>, frame: [f64; 2]) -> Self {
         let across = Axis::logarithmic(across, lines.iter().flat_map(places), [LEFT, RIGHT]);
         Self::new(across, Axis::logarithmic(up, lines.iter().flat_map(heights), frame), lines)
     }
 
-    /// With linear axes around all `lines`.
+    /// A panel with linear axes around all `lines`.
     pub(super) fn linear(across: &str, up: &str, lines: Vec<Line>, frame: [f64; 2]) -> Self {
         let across = Axis::linear(across, lines.iter().flat_map(places), [LEFT, RIGHT]);
         Self::new(across, Axis::linear(up, lines.iter().flat_map(heights), frame), lines)

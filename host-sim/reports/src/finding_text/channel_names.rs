@@ -3,7 +3,7 @@
 use crate::formatting::words;
 use noise_analysis::report::ChannelReport;
 
-/// Such as `accel x`.
+/// The name of a channel, such as `accel x`.
 pub(crate) fn channel_name(channel: &ChannelReport) -> String {
     channel_list([&channel.name])
 }

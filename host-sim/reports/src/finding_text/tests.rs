@@ -487,6 +487,22 @@ fn a_share_becomes_a_gain_in_sigma() {
     // 1 − √(1 − 0.75) = 50 %.
     assert!(text.advice.ends_with("It would take 50 % off σ where it is largest."), "{}", text.advice);
     assert_eq!(text.weight, "up to 75 % of σ²");
+    for (minute, weight) in [(30.0, "up to 75 % of σ², 30 % around τ = 1 min"), (75.0, "75 % of σ² around τ = 1 min")]
+    {
+        line.minute_percent.insert("gyro_z".to_owned(), minute);
+        assert_eq!(describe(&line, &[]).weight, weight);
+    }
+}
+
+/// Nobody has to look up the time, and one remedy of several findings is one step.
+#[test]
+fn advice_names_its_time_and_is_the_same_for_every_kind_of_rounding() {
+    let step = |effect: Effect| describe(&finding(effect), &[]).step.expect("a step");
+    let change = LevelStep { time_s: MOMENT, size: rate(0.2, 0.1), p_value: 1e-9 };
+    assert_eq!(step(change.into()), "Look for a shock, a changed supply or a touched cable at 12 min 20 s.");
+    let is_rounding = |effect: &Effect| matches!(effect.name(), "quantization" | "noise_below_count");
+    let steps: Vec<String> = examples().into_iter().filter(is_rounding).map(step).collect();
+    assert!(steps.len() >= 3 && steps.iter().all(|step| *step == steps[0]), "{steps:?}");
 }
 
 #[test]

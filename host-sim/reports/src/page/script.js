@@ -134,7 +134,6 @@
   // Everything that can be saved is in one list at the top.
   const save = document.getElementById("save");
   const list = document.createElement("select");
-  list.setAttribute("aria-label", "What to save");
   const sources = new Map();
   const offer = (name, file, make) => {
     sources.set(file, make);
@@ -159,7 +158,9 @@
     link.href = button.dataset.saved = await sources.get(list.value)();
     link.click();
   });
-  save.append(list, button);
+  const label = document.createElement("label");
+  label.append("Figures and tables: ", list);
+  save.append(label, button);
   // A link into a channel unfolds it; the contents mark the section that is read.
   const unfold = () => {
     const target = document.getElementById(location.hash.slice(1));

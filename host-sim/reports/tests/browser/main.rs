@@ -244,15 +244,27 @@ fn the_page_of_an_hour_of_twelve_channels_is_below_700_kilobytes() {
 #[test]
 fn the_page_fits_and_can_be_read_in_both_colour_schemes() {
     let Some(program) = chromium() else { return };
+    // The longest numbers of a measured run, such as 2.21 (1.3 … 13) and 4,590 → 3.9 % !
+    let mut report = report();
+    for channel in &mut report.channels {
+        for term in channel.refitted.terms.iter_mut().map(|term| &mut term.term) {
+            (term.low, term.high) = (0.6 * term.value, 6.0 * term.value);
+        }
+        channel.after.unseen.deviance_per_point = Some(5.0);
+        channel.before.unseen.rms_percent = Some(385.0);
+    }
     for is_dark in [false, true] {
-        for facts in facts(program, &report(), is_dark, &[400, 1300]) {
+        for facts in facts(program, &report, is_dark, &[400, 800, 1300]) {
             let width = &facts["width"];
             assert_eq!(facts["dark"], is_dark);
             assert_eq!(facts["overflow"], 0, "at {width} pixels");
             let cut: Vec<&str> = list(&facts, "cut").iter().filter_map(Value::as_str).collect();
             // Section links and tables scroll on a telephone; figures do not.
             let is_scrolled = |of: &str| (of.is_empty() || of.ends_with("scroll")) && !of.starts_with("verdict");
-            let is_allowed = |of: &&&str| width.as_u64().is_some_and(|width| width <= 400) && is_scrolled(of);
+            let is_within = |most: u64| width.as_u64().is_some_and(|width| width <= most);
+            // The numbers of a curve have ten columns.
+            let is_allowed =
+                |of: &&&str| is_within(400) && is_scrolled(of) || is_within(800) && **of == "channels scroll";
             assert!(cut.iter().all(|of| is_allowed(&of)), "{cut:?} at {width} pixels");
             let worst = &facts["contrasts"][0];
             assert!(worst[0].as_f64().expect("a contrast") >= 4.5, "{} at {width}, dark {is_dark}", facts["contrasts"]);

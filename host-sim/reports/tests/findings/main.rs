@@ -160,7 +160,7 @@ fn what_the_second_half_contradicts_is_not_to_be_subtracted() {
     let kinds = signed_kinds();
     for kind in &kinds[..6] {
         let report = report(*kind, SIZES, Validation::No);
-        let steps = reports::summary::next_steps(&report).join(" ");
+        let steps = reports::summary::numbered_steps(&report).join(" ");
         let advice = &reports::summary::findings(&report).0[0].advice;
         for text in [&steps, advice] {
             assert!(!["Subtract", "Compensate"].iter().any(|word| text.contains(word)), "{text}");

@@ -3,9 +3,19 @@
 mod explanation;
 
 use crate::fixture::{self, channel, empty, report};
-use noise_analysis::report::{ChannelReport, ModelErrorReport, Report, SlopeMethodValue, TermReport};
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::{Effect, EffectiveLsb, LevelStep};
+use noise_analysis::report::{
+    BiasOverTime, ChannelReport, Finding, ModelErrorReport, Report, SlopeMethodValue, TermReport, Validation,
+};
+use reports::reading::ReadingRecord;
 use reports::{figure, full_tables, page};
 use roxmltree::{Document, Node};
+use std::collections::BTreeMap;
+
+fn of(value: f64) -> BoundedEstimate {
+    BoundedEstimate::new(value, 0.9 * value, 1.1 * value)
+}
 
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
@@ -266,7 +276,7 @@ fn the_page_shows_every_channel_and_coefficient() {
         assert!(page.contains(&format!("{channel} · Allan deviation")), "{channel}");
     }
     // N of `final` in the units of its users: 0.0368 deg/√s (0.0346 … 0.0394) are 2.208 °/√h; 36.8 mg·√s are 36.8 µg/√Hz.
-    for expected in ["2.21\n±\u{a0}0.14", "°/√h", "36.8", "µg/√Hz", "24\u{a0}→\u{a0}4.0\u{a0}%", "14,321"] {
+    for expected in ["2.21\n±\u{a0}0.14", "°/√h", "36.8", "µg/√Hz", "24 →\u{a0}4.0\u{a0}%", "14,321"] {
         assert!(page.contains(expected), "{expected}");
     }
     // A line does not end before a per cent sign.
@@ -336,9 +346,57 @@ fn the_first_picture_is_there_without_a_gain() {
     for channel in &mut report.channels {
         channel.after = channel.before.clone();
     }
+    // Fewer percent, but less probable: the picture has the figure of the table.
+    report.channels[2].after.unseen.deviance_per_point = Some(2e4);
+    report.channels[2].after.unseen.rms_percent = Some(2.0);
     let story = picture(&report, "story");
-    assert!(story.contains("model: N, B, K") && story.contains("No effect lowers it."));
-    assert!(!story.contains("after: with effects"));
+    assert!(story.contains("model of the first half") && !story.contains("after: with effects"));
+    let page = html(&report);
+    assert!(page.contains("<figcaption>Gyro z: σ is off by 2.0 %</figcaption>"), "{story}");
+    assert!(page.contains("→\u{a0}2.0\u{a0}%"));
+}
+
+/// The second picture is not the curve of the first once more, and a curve that falls to its end has no minimum.
+#[test]
+fn the_second_picture_has_what_the_first_has_not() {
+    let mut report = report();
+    let in_gyro = |effect: Effect| Finding {
+        effect,
+        channels: vec!["gyro_x".to_owned()],
+        clearest: 0,
+        validated: Validation::Untestable,
+        share_percent: BTreeMap::new(),
+        minute_percent: BTreeMap::new(),
+    };
+    let title = |report: &Report| {
+        let page = html(report);
+        let figure = page.split("<figure id=\"strongest\"").nth(1).expect("a second picture");
+        let caption = figure.split("<figcaption>").nth(1).and_then(|rest| rest.split('<').next());
+        caption.expect("a caption").to_owned()
+    };
+    let step = of(0.05).in_unit("deg/s");
+    report.findings = vec![in_gyro(EffectiveLsb { step, counts: 1, values: 9, changes: 9 }.into())];
+    assert_eq!(title(&report), "Allan deviation of the gyros");
+    report.findings.push(in_gyro(LevelStep { time_s: of(4000.0), size: step, p_value: 1e-9 }.into()));
+    for channel in &mut report.channels {
+        channel.figure_data.bias_over_time =
+            Some(BiasOverTime { block_s: 40.0, time_s: vec![20.0, 60.0], mean: vec![0.0, 0.1], followed: vec![] });
+    }
+    assert_eq!(title(&report), "Evidence 2: bias step in gyro x");
+    let lowest = |report: &Report| html(report).contains(" Lowest: gyro x ");
+    assert!(lowest(&report));
+    for channel in &mut report.channels {
+        channel.curve.truncate(6);
+    }
+    assert!(!lowest(&report));
+}
+
+#[test]
+fn a_recording_that_was_not_read_to_its_end_says_so_in_the_answer() {
+    let reading = ReadingRecord { damage: Some("truncated".to_owned()), ..ReadingRecord::default() };
+    let page = page::html(&report(), None, Some(&reading));
+    let answer = page.split("<section class=\"verdict\"").nth(1).and_then(|rest| rest.split("</section>").next());
+    assert!(answer.is_some_and(|answer| answer.contains("Not read to its end: truncated.")), "{answer:?}");
 }
 
 #[test]
@@ -426,7 +484,7 @@ fn a_model_that_fails_at_one_averaging_time_is_told_in_words() {
     assert!(flat(text(&report)).contains(words) && html(&report).contains(words));
     let usual = fixture::report();
     assert!(!text(&usual).contains("what is measured") && text(&usual).contains("−1.876"));
-    assert!(html(&usual).contains("−1.876 σ"));
+    assert!(html(&usual).contains("−1.876"));
 }
 
 #[test]

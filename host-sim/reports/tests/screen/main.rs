@@ -452,7 +452,7 @@ fn a_record_too_short_for_a_model_says_what_it_is_good_for() {
     let error = &mut contradicted.channels[0].after.unseen;
     (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(46.0), Some(0.01), Some(1.3));
     assert!(reports::summary::nothing_found(&contradicted).contains("N, B and K do not describe"));
-    assert_eq!(reports::summary::next_steps(&rough), ["For a filter: record at rest for hours."]);
+    assert!(plain(&rough, 80).join(" ").contains("For a filter: record at rest for hours."));
 }
 
 #[test]
@@ -513,15 +513,26 @@ fn what_the_data_contradicts_is_told_in_sentences() {
     // Twice the expected variance.
     let innovations =
         Innovations { count: 1000, normalised: 2.0, low: 0.9, high: 1.1, correlation: 0.0, whiteness_p: 0.5 };
-    contradicted.channels[5].assessment.innovations = Some(innovations);
+    contradicted.channels[5].assessment.innovations = Some(innovations.clone());
     assert_eq!(
         reports::summary::contradictions(&contradicted),
         [
             "accel x at τ = 8.0 s: σ is 2.0 times the model (50 standard errors)",
             "accel y at τ = 82 s: σ is 25 % above the model (8.2 standard errors)",
-            "a Kalman filter with the models of accel z would claim a smaller error than it has",
+            "a Kalman filter with the models of accel z claims a smaller error than it has",
         ]
     );
+    // In one line the place that is farthest off, or a sentence that fits.
+    let told =
+        |report: &Report| plain(report, 80).into_iter().find(|line| line.starts_with("Model is off")).expect("a line");
+    let error = &mut contradicted.channels[3].after.unseen;
+    error.worst_ratio = Some(0.99);
+    assert_eq!(told(&contradicted), "Model is off     3 places; accel y at τ = 82 s: σ is 25 % above the model.");
+    for channel in &mut contradicted.channels {
+        channel.after.unseen.worst_sigma = None;
+        channel.assessment.innovations = Some(innovations.clone());
+    }
+    assert_eq!(told(&contradicted), "Model is off     a Kalman filter of 6 channels claims too small an error.");
 }
 
 /// Long blocks: each finding has a line or is counted.
