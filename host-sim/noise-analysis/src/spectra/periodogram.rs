@@ -185,3 +185,25 @@ impl SineTapered {
         self.transforms.iter().zip(&other.transforms).map(|(a, b)| (a[at] * b[at].conj()).re).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{taper, taper_response};
+    use std::f64::consts::TAU;
+
+    /// The transform of the taper itself, on and off the limits of the closed form.
+    #[test]
+    fn the_response_of_the_taper_is_its_transform() {
+        const LENGTH: usize = 20_000;
+        let power = |distance: f64| {
+            let terms = (0..LENGTH).map(|at| (taper(at, LENGTH), TAU * distance * at as f64 / LENGTH as f64));
+            let (re, im) = terms
+                .fold((0.0, 0.0), |(re, im), (weight, angle)| (re + weight * angle.cos(), im + weight * angle.sin()));
+            re * re + im * im
+        };
+        for distance in [0.3, 1.0, 2.5, 7.3, 10.0, 23.4] {
+            let (expected, found) = (power(distance) / power(0.0), taper_response(distance));
+            assert!((found - expected).abs() < 1e-3 * expected + 1e-9, "{distance}: {found} {expected}");
+        }
+    }
+}
