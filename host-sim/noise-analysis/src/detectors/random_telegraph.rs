@@ -72,8 +72,9 @@ pub(crate) enum Law {
 }
 
 impl Law {
-    /// The law that is [`TOLD_APART`] times as likely as the other one, of a process with about this standard deviation and this correlation
-    /// time, in s. Its white noise is behind a filter whose response lasts `filter_s` seconds, or behind none.
+    /// The law of a process with about this standard deviation and this correlation time, in s. Its white noise is behind a filter whose response
+    /// lasts `filter_s` seconds, or behind none. A Gaussian process has to be [`TOLD_APART`] times as likely. Two levels need [`LEAST_GAIN`], as
+    /// they do if they are sought: outliers are nearer to levels than to a Gaussian process.
     pub(crate) fn of_process(
         series: &UniformSeries,
         deviation: f64,
@@ -90,7 +91,7 @@ impl Law {
         if -gain > TOLD_APART.ln() {
             return Some(Self::Gaussian);
         }
-        let are_levels = gain > TOLD_APART.ln() && is_two_levels(&chain) && stays_at_levels(&chain, &parts);
+        let are_levels = gain > LEAST_GAIN && is_two_levels(&chain) && stays_at_levels(&chain, &parts);
         let distance = chain.occupancy().iter().product::<f64>().sqrt().recip();
         are_levels.then_some(Self::TwoLevels { jumps: chain.jumps, gain, distance })
     }
