@@ -97,13 +97,16 @@ pub(crate) fn for_each_batch<B: Send>(
 
 /// Verdicts on register counts within their fields; missing ones count as not recorded.
 fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
-    let mut rows = vec![NOT_RECORDED; batch.rows];
-    for (channel, column) in validator.channels().iter().zip(&batch.values) {
-        for (counts, value) in rows.iter_mut().zip(column).filter(|(_, value)| !value.is_nan()) {
-            counts[*channel as usize] = *value as i16;
+    let verdict = |row: usize| {
+        let mut counts = NOT_RECORDED;
+        for (channel, column) in validator.channels().iter().zip(&batch.values) {
+            if !column[row].is_nan() {
+                counts[*channel as usize] = column[row] as i16;
+            }
         }
-    }
-    rows.into_iter().map(|counts| validator.judge(&Burst::from_counts(&Counts::new(counts)))).collect()
+        validator.judge(&Burst::from_counts(&Counts::new(counts)))
+    };
+    (0..batch.rows).map(verdict).collect()
 }
 
 pub(crate) struct RecordedRows<'a> {

@@ -32,13 +32,6 @@ pub(crate) fn refusal(column: &ValueColumn, value: f64, verdict: Option<&Verdict
     }
 }
 
-/// True for register counts of which none is missing or refused, by far the most.
-pub(crate) fn are_all_counts(column: &ValueColumn, values: &[f64], verdicts: &[Verdict]) -> bool {
-    column.register.is_some()
-        && verdicts.iter().all(|verdict| verdict.refused.is_empty())
-        && !values.iter().any(|value| value.is_nan())
-}
-
 fn refusal_of_register(channel: Channel, count: f64, verdict: Verdict) -> Option<&'static str> {
     if !verdict.refused.contains(channel) {
         return None;
@@ -84,14 +77,7 @@ impl ColumnSurvey {
 
     /// Sets refused numbers to NaN.
     pub(crate) fn add(&mut self, column: &ValueColumn, values: &mut [f64], verdicts: &[Verdict]) {
-        let others = if are_all_counts(column, values, verdicts) {
-            self.is_usable |= !values.is_empty();
-            self.has_other_than_zero = self.has_other_than_zero || values.iter().any(|value| *value != 0.0);
-            &mut []
-        } else {
-            &mut *values
-        };
-        for (row, value) in others.iter_mut().enumerate() {
+        for (row, value) in values.iter_mut().enumerate() {
             if let Some(cause) = refusal(column, *value, verdicts.get(row)) {
                 *self.refused.entry(cause).or_insert(0) += 1;
                 *value = f64::NAN;

@@ -2,7 +2,7 @@
 
 use crate::batch_source::{BatchSource, RecordedRows};
 use crate::file_format::{RecordedInput, options_of_counts};
-use crate::reading::column_survey::{ColumnSurvey, are_all_counts, refusal, rounding_note};
+use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
 use crate::recording::{Recording, Verdict};
 use adis16405_driver::{Faults, GyroRange};
@@ -712,8 +712,11 @@ impl StreamedColumn {
     /// Sets `off_step` for a number off the step.
     fn channel(&self, values: &[f64], verdicts: &[Verdict], off_step: &mut bool) -> Option<MeasuredChannel> {
         let (quantizer, profile) = (self.quantizer.as_ref()?, self.profile()?);
-        if are_all_counts(&self.column, values, verdicts) {
-            return Some(MeasuredChannel::new(profile, values.iter().map(|value| *value as i32).collect()));
+        if self.column.register.is_some() && verdicts.iter().all(|verdict| verdict.refused.is_empty()) {
+            // All but missing words are counts.
+            if !values.iter().any(|value| value.is_nan()) {
+                return Some(MeasuredChannel::new(profile, values.iter().map(|value| *value as i32).collect()));
+            }
         }
         let mut counts = Vec::with_capacity(values.len());
         let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
