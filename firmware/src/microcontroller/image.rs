@@ -21,16 +21,8 @@ pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
         retained.clear();
     }
     let boot = Boot { cause, crash_record: CRASH_RECORD.take(), clock, ..Boot::default() };
-    let cause = match cause {
-        BootCause::Unknown => "of unknown cause",
-        BootCause::PowerOn => "by power-on",
-        BootCause::BrownOut => "by brown-out",
-        BootCause::Pin => "by the reset pin",
-        BootCause::Software => "by the program",
-        BootCause::Watchdog => "by the watchdog",
-    };
     let (crystal, record) = (clock == ClockSource::Crystal, boot.crash_record.as_str());
-    defmt::info!("start {=str}, crystal {=bool}, crash record: {=str}", cause, crystal, record);
+    defmt::info!("start {=str}, crystal {=bool}, crash record: {=str}", cause.text(), crystal, record);
     (boot, retained)
 }
 
