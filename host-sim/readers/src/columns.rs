@@ -1,6 +1,7 @@
 //! Columns of a recording: names, choice, units.
 
 pub(crate) mod column_selection;
+pub(crate) mod printable;
 pub(crate) mod unit;
 
 /// Those of a gyroscope.

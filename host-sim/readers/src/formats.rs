@@ -17,6 +17,7 @@ mod message_layout;
 mod nmea;
 pub(crate) mod numpy;
 pub(crate) mod numpy_header;
+mod records;
 mod ros_bag;
 mod ros_definition;
 mod ros_message;

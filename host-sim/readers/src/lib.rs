@@ -10,13 +10,14 @@ pub mod inspection;
 mod rows;
 
 pub use columns::column_selection::{ColumnSelection, ReadOptions, SelectionError, is_output_register};
+pub use columns::printable::Printable;
 pub use columns::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
 pub use formats::file_format::{FileFormat, HEAD_BYTES, InputFile, TopicDescription, files_of_bag};
 pub use formats::memory_table::{MemoryArray, MemoryColumn, MemoryTable};
 pub use input::delimited_text;
 pub use input::file_bytes::{FileBytes, OpenBytes};
 pub use input::file_hash::FileHash;
-pub use input::input_error::{InputError, Printable, Reason, StreamError};
+pub use input::input_error::{InputError, Reason, StreamError};
 pub use input::read_monitor::{ReadMonitor, ReadPass};
 pub use input::threads::{may_begin_threads, read_on_one_thread};
 pub use rows::batch::{Batch, Number, RegisterField, RowBefore, ValueColumn};

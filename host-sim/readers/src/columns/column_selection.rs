@@ -1,6 +1,7 @@
 //! The columns of channels, time and index with their units, as the user says or by their names.
 
 use crate::columns;
+use crate::columns::printable::Printable;
 use crate::columns::unit::{COUNT, SECOND, Unit};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 
@@ -284,7 +285,11 @@ impl ColumnSelection {
                     ))
                 })?,
             };
-            let by_name = available.iter().position(|column| column.name == *wanted);
+            // As printed, which escapes letters of an unknown encoding.
+            let is_named = |column: &AvailableColumn| {
+                column.name == *wanted || wanted.contains('\\') && Printable(&column.name).to_string() == *wanted
+            };
+            let by_name = available.iter().position(is_named);
             let heading = AvailableColumn::from_heading(wanted);
             let position = by_name
                 .or_else(|| available.iter().position(|column| *column == heading))

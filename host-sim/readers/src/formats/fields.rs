@@ -1,5 +1,6 @@
 //! Fields of a text row and their numbers.
 
+use crate::columns::unit::Unit;
 use crate::input::delimited_text;
 use crate::rows::batch::Number;
 
@@ -14,15 +15,15 @@ const MISSING: [&str; 22] = [
 /// Between time and line in the Arduino serial monitor.
 pub(crate) const ARROW: &str = " -> ";
 
-/// Behind a serial monitor's time.
+/// Behind a serial monitor's time; a semicolon may end a row of MATLAB.
 pub(crate) fn separator_of(text: &str) -> Option<char> {
     let fields = text.split_once(ARROW).map_or(text, |(_, rest)| rest);
-    if fields.contains('"') {
-        // Every second part is quoted.
-        let is_outside = |separator: &char| fields.split('"').step_by(2).any(|part| part.contains(*separator));
-        return SEPARATORS.into_iter().find(is_outside);
-    }
-    SEPARATORS.into_iter().find(|separator| fields.contains(*separator))
+    let row = fields.trim_end_matches([';', ' ']);
+    let is_ended = row.len() < fields.len() && (row.contains(char::is_whitespace) || row.matches(',').count() > 1);
+    let fields = if is_ended { row } else { fields };
+    // Every second part is quoted.
+    let is_outside = |separator: &char| fields.split('"').step_by(2).any(|part| part.contains(*separator));
+    SEPARATORS.into_iter().find(is_outside)
 }
 
 pub(crate) fn split(text: &str, separator: Option<char>) -> Fields<'_> {
@@ -125,7 +126,8 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// Also with decimal comma, with the exponent `D` of Fortran or behind a bracket; NaN if missing; `None` for other texts.
+/// Also with decimal comma, groups of digits, the exponent `D` of Fortran, as `0x1F`, or of a program's text: in brackets,
+/// `0.5f`, `0.5;`. NaN if missing; `None` for other texts.
 pub(crate) fn number(field: &str) -> Option<Number> {
     if let Some(number) = short_number(field.as_bytes()) {
         return Some(number);
@@ -137,9 +139,43 @@ pub(crate) fn number(field: &str) -> Option<Number> {
     }
     let real = field.parse().ok().or_else(|| field.replace(',', ".").replace(['D', 'd'], "e").parse().ok());
     let missing = || MISSING.contains(&field.to_lowercase().as_str()).then_some(f64::NAN);
-    let inner = field.trim_matches(['[', ']', '(', ')']);
-    let in_brackets = || number(Some(inner).filter(|inner| !inner.is_empty() && inner.len() < field.len())?);
-    real.or_else(missing).map(Number::Real).or_else(in_brackets)
+    let inner = field.trim_matches(['[', ']', '(', ')', '{', '}', ';', '\'', ' ']);
+    let inner = inner.strip_suffix('f').filter(|inner| inner.contains('.')).unwrap_or(inner);
+    let in_text = || number(Some(inner).filter(|inner| !inner.is_empty() && inner.len() < field.len())?);
+    real.or_else(missing).or_else(|| grouped(field)).map(Number::Real).or_else(|| hexadecimal(field)).or_else(in_text)
+}
+
+/// `0x1F`; 4, 8 and 16 digits are a word in two's complement.
+fn hexadecimal(field: &str) -> Option<Number> {
+    let digits = field.strip_prefix("0x").or_else(|| field.strip_prefix("0X"))?;
+    let word = u64::from_str_radix(digits, 16).ok()?;
+    let unused = if let 4 | 8 = digits.len() { 64 - 4 * digits.len() } else { 0 };
+    Some(Number::Integer((word << unused).cast_signed() >> unused))
+}
+
+/// `1,524.3` or `1.524,3`.
+fn grouped(field: &str) -> Option<f64> {
+    let (whole, decimals) = field.split_at(field.rfind([',', '.'])?);
+    let sign = if decimals.starts_with('.') { ',' } else { '.' };
+    let (first, others) = whole.split_once(sign)?;
+    let is_group = |group: &str| group.len() == 3 && group.bytes().all(|byte| byte.is_ascii_digit());
+    let is_grouped = first.trim_start_matches(['-', '+']).len() <= 3 && others.split(sign).all(is_group);
+    let plain = || format!("{}.{}", whole.replace(sign, ""), &decimals[1..]).parse().ok();
+    is_grouped.then(plain).flatten()
+}
+
+/// With its unit in the cell: `0.12 deg/s`, `23.4°C`.
+pub(crate) fn with_unit(field: &str) -> Option<(Number, Unit)> {
+    let parts = |at: usize| Some((number(&field[..at])?, Unit::parse(&field[at..])?));
+    let at_blank = || parts(field.find(char::is_whitespace)?);
+    // One letter behind whole numbers may be a digit.
+    let at_letter = || {
+        let at = field.find(|letter: char| letter.is_alphabetic() || letter == '°')?;
+        parts(at).filter(|_| field[..at].contains('.') || field[at..].len() > 1)
+    };
+    field
+        .starts_with(|first: char| first.is_ascii_digit() || "+-.".contains(first))
+        .then(|| at_blank().or_else(at_letter))?
 }
 
 /// Both numerator and power of ten are exact.

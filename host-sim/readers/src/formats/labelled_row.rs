@@ -2,9 +2,12 @@
 
 use serde_json::Value;
 
+/// Names with their texts.
+pub(crate) type Record = Vec<(String, String)>;
+
 const SEPARATORS: [char; 4] = [',', ';', '\t', '|'];
 
-pub(crate) fn parse(line: &str) -> Option<Vec<(String, String)>> {
+pub(crate) fn parse(line: &str) -> Option<Record> {
     let line = line.trim();
     if line.starts_with('{') {
         let Ok(object @ Value::Object(_)) = serde_json::from_str(line) else { return None };
@@ -12,8 +15,13 @@ pub(crate) fn parse(line: &str) -> Option<Vec<(String, String)>> {
         add(&object, "", &mut found);
         return (!found.is_empty()).then_some(found);
     }
-    let mut found = Vec::new();
-    let mut rest = line;
+    pairs(line).filter(|found| found.len() > 1)
+}
+
+/// The pairs of a line of text, perhaps none; `None` for another line.
+pub(crate) fn pairs(line: &str) -> Option<Record> {
+    let mut found: Record = Vec::new();
+    let (mut rest, mut group) = (line, "");
     while let Some((label, after)) = rest.split_once([':', '=']) {
         let label = label.rsplit(SEPARATORS).next().unwrap_or(label).trim_matches([' ', '>', '"']);
         let after = after.trim_start();
@@ -22,14 +30,23 @@ pub(crate) fn parse(line: &str) -> Option<Vec<(String, String)>> {
         if !label.starts_with(char::is_alphabetic) {
             return None;
         }
-        found.push((label.to_owned(), value.to_owned()));
         rest = next;
+        if value.contains('=') {
+            // A log's own words, before the first name.
+            rest = after;
+        } else if label.len() == 1 && !group.is_empty() {
+            found.push((format!("{group} {label}"), value.to_owned()));
+        } else {
+            // `Gyro X=0.5 Y=0.1`.
+            group = label.strip_suffix(" X").or_else(|| label.strip_suffix(" x")).unwrap_or_default();
+            found.push((label.to_owned(), value.to_owned()));
+        }
     }
-    (found.len() > 1).then_some(found)
+    Some(found)
 }
 
 /// JSON by path: `gyro.x`, `gyro.0`.
-fn add(value: &Value, path: &str, found: &mut Vec<(String, String)>) {
+fn add(value: &Value, path: &str, found: &mut Record) {
     let inner = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
     match value {
         Value::Object(fields) => fields.iter().for_each(|(name, value)| add(value, &inner(name), found)),
@@ -51,7 +68,8 @@ mod tests {
     fn numbers_are_found_with_their_names() {
         for (line, expected) in [
             ("gx: 0.01, gy: -0.02", "gx=0.01 gy=-0.02"),
-            ("t=12 Gyro X=0.5 Y=1e-3", "t=12 Gyro X=0.5 Y=1e-3"),
+            ("t=12 Gyro X=0.5 Y=1e-3", "t=12 Gyro X=0.5 Gyro Y=1e-3"),
+            ("I (90) imu: ax=0.1 ay=-1", "ax=0.1 ay=-1"),
             (">gx:1,gy:2", "gx=1 gy=2"),
             ("time: 10:00:13.5\tax: 1 g\tay: 2 g", "time=10:00:13.5 ax=1 ay=2"),
             (r#"{"t": 5, "gyro": [0.1, 2], "imu": {"ax": null}}"#, "gyro.0=0.1 gyro.1=2 imu.ax= t=5"),

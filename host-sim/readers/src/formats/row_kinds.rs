@@ -9,7 +9,7 @@ const MOST_KINDS: usize = 8;
 const LEAST_ROWS: usize = 2;
 /// Columns that number devices, between blanks.
 const NUMBERED: &str = "id device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance \
-    sensor_type sensortype";
+    sensor_type sensortype type";
 const LEAST_NUMBERS: usize = 2;
 
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! The head of a text table: start of the rows, preamble, columns.
 
-use crate::columns::column_selection::AvailableColumn;
+use crate::columns::column_selection::{AvailableColumn, is_output_register};
 use crate::columns::unit::Unit;
 use crate::formats::calendar::{self, CalendarColumns};
-use crate::formats::fields::{list_lengths, number, separator_of, split};
+use crate::formats::fields::{list_lengths, number, separator_of, split, with_unit};
 use crate::formats::row_kinds::RowKind;
 use crate::input::delimited_text;
 use std::collections::{BTreeMap, VecDeque};
@@ -60,8 +60,15 @@ impl TableHead {
             let other = kinds_of_fields(&self.rows[at].1);
             shapes[at] == shapes[longest.start] && other.iter().zip(&own).all(|(one, own)| one.is_like(*own))
         };
-        while let Some(before) = (0..first).rev().take(MOST_BETWEEN + 1).find(|at| is_alike(*at)) {
-            first = before;
+        // Numbers above a heading are no rows; a heading that comes again is one of damaged lines.
+        let is_heading = |at: usize| {
+            let fields = kinds_of_fields(&self.rows[at].1);
+            let is_first = || self.preamble.iter().all(|(_, text)| *text != self.rows[at].1);
+            fields.len() == own.len() && fields.iter().all(|kind| *kind == FieldKind::Text) && is_first()
+        };
+        let before = |first: usize| (0..first).rev().take_while(|at| !is_heading(*at)).take(MOST_BETWEEN + 1);
+        while let Some(row) = before(first).find(|at| is_alike(*at)) {
+            first = row;
         }
         let rows = self.rows.split_off(first);
         self.preamble.extend(std::mem::replace(&mut self.rows, rows));
@@ -105,8 +112,10 @@ impl TableHead {
         let lists = Lists(lengths);
         let width = self.width_of(&row, &lists);
         let mut calendar = CalendarColumns::find(&row);
-        // R's `write.table` numbers rows without a name.
-        let is_numbered = matches!(own.as_slice(), [first, second, ..] if first.first() == Some(&"1") && second.first() == Some(&"2"));
+        // R's `write.table` numbers rows without a name, pandas from 0.
+        let first_of = |at: usize| own.get(at).and_then(|row| row.first()).copied();
+        let is_numbered =
+            [["1", "2"], ["0", "1"]].iter().any(|[one, two]| first_of(0) == Some(*one) && first_of(1) == Some(*two));
         let is_short = |names: usize| names + 1 == width && matches!(calendar, Some(CalendarColumns::Two(_)));
         let is_unnumbered = |names: usize| names + 1 == width && is_numbered;
         let names_of = |text: &str| lists.names(&names(text, self.separator, lists.cells(width)));
@@ -152,6 +161,15 @@ impl TableHead {
         }
         let unnamed = available.len()..width;
         available.extend(unnamed.map(|number| AvailableColumn { name: number.to_string(), unit: None }));
+        for (at, column) in available.iter_mut().enumerate() {
+            let fields = || own.iter().filter_map(|row| row.get(at));
+            let is_fraction = |field: &&str| number(field).is_some_and(|number| number.value().fract().abs() > 0.0);
+            // Registers may be scaled.
+            if is_output_register(&column.name) && fields().any(is_fraction) {
+                column.unit = None;
+            }
+            column.unit = column.unit.or_else(|| fields().find_map(|field| with_unit(field)).map(|(_, unit)| unit));
+        }
         calendar = calendar.or_else(|| CalendarColumns::parts(&available, &own));
         if let Some(columns) = &calendar {
             set_calendar(&mut available, columns);
@@ -257,6 +275,7 @@ fn kinds_of_fields(text: &str) -> Vec<FieldKind> {
     let kind = |field: &str| match number(field) {
         Some(known) if known.value().is_nan() => FieldKind::Missing,
         Some(_) => FieldKind::Number,
+        None if with_unit(field).is_some() => FieldKind::Number,
         None => FieldKind::Text,
     };
     split(text, separator_of(text)).map(kind).collect()
@@ -400,7 +419,7 @@ pub(crate) fn named_columns(names: &[String], units: Option<&[Option<Unit>]>) ->
 
 /// At least half numbers or calendar times, or all missing; other texts may be frames.
 pub(crate) fn is_row(text: &str) -> bool {
-    if text.starts_with('{') {
+    if text.starts_with('{') && text.contains(':') {
         return false; // An object of names and numbers.
     }
     let separator = separator_of(text);
@@ -415,7 +434,7 @@ pub(crate) fn is_row(text: &str) -> bool {
             Some(_) => numbers += 1,
             None => {
                 let is_time = calendar::time_of_day(field).is_some() || calendar::date_time(field).is_some();
-                numbers += usize::from(is_time || calendar::date(field).is_some());
+                numbers += usize::from(is_time || calendar::date(field).is_some() || with_unit(field).is_some());
             }
         }
     }

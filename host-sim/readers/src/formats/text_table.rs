@@ -1,11 +1,11 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ReadOptions, Role, SelectionError, as_they_are};
-use crate::columns::unit::COUNT;
+use crate::columns::unit::{COUNT, Unit};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
-use crate::formats::fields::{leading_number, number, split};
-use crate::formats::labelled_row;
+use crate::formats::fields::{leading_number, number, split, with_unit};
 use crate::formats::nmea::{self, Sentence};
+use crate::formats::records::{Records, Taken, values_of};
 use crate::formats::row_kinds::{RowKind, RowKinds};
 use crate::formats::table_head::{self, HEAD_LINES, Line, TableColumns, TableHead, is_row};
 use crate::input::delimited_text::{self, Lines};
@@ -47,8 +47,8 @@ enum Layout {
     },
     /// Sentences of one kind.
     Sentences { name: String, damaged: u64, others: u64 },
-    /// Lines that name each number; `others` lack these names.
-    Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
+    /// Records that name each number; `others` lack these names.
+    Labelled { records: Records, names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
 }
 
 /// Rows of a kind that is counted, with the first.
@@ -149,6 +149,11 @@ impl TextTable {
         let is_whole = first.len() < HEAD_LINES;
         let sentence = first.iter().position(|(_, text)| Sentence::parse(text).is_some());
         let row = first.iter().position(|(_, text)| is_row(text));
+        if sentence.is_none()
+            && let Some((records, names, start)) = Records::of_several_lines(&first)
+        {
+            return opened.labelled(records, names, first.split_off(start));
+        }
         match (sentence, row) {
             (Some(sentence), row) if row.is_none_or(|row| sentence <= row) => {
                 opened.sentences(topic, first.split_off(sentence).into())
@@ -158,8 +163,8 @@ impl TextTable {
                 opened.columns(topic, head)
             }
             _ => {
-                if let Some(names) = labelled_names(&first) {
-                    return opened.labelled(names, first);
+                if let Some((records, names)) = Records::of_lines(&first) {
+                    return opened.labelled(records, names, first);
                 }
                 let last = first.last().map(|(line, _)| *line);
                 Err(match (last, opened.lines.take_damage()) {
@@ -295,17 +300,23 @@ impl Opened<'_> {
     }
 
     /// `first` are lines already read.
-    fn labelled(self, names: Vec<String>, first: Vec<Line>) -> Result<TextTable, InputError> {
-        let rows = first.iter().filter_map(|(_, text)| labelled_row::parse(text));
-        let row = rows.map(|row| values_of(&names, row)).next().unwrap_or_default();
-        let calendar = CalendarColumns::find(&row.iter().map(String::as_str).collect::<Vec<_>>());
+    fn labelled(self, mut records: Records, names: Vec<String>, first: Vec<Line>) -> Result<TextTable, InputError> {
+        let record = first.iter().find_map(|(_, text)| match records.push(text) {
+            Taken::Record(record) => Some(record),
+            Taken::Part | Taken::Other => None,
+        });
+        records.finish();
+        let row = values_of(&names, record.unwrap_or_default());
+        let row: Vec<&str> = row.iter().map(String::as_str).collect();
         let mut available = table_head::named_columns(&names, None);
+        let calendar =
+            CalendarColumns::find(&row).or_else(|| CalendarColumns::parts(&available, std::slice::from_ref(&row)));
         if let Some(calendar) = &calendar {
             table_head::set_calendar(&mut available, calendar);
         }
         let chosen = self.chosen(&available)?;
         let fields = RowFields::new(names.len(), false, &chosen);
-        let layout = Layout::Labelled { names, calendar: calendar.map(CalendarClock::new), others: 0 };
+        let layout = Layout::Labelled { records, names, calendar: calendar.map(CalendarClock::new), others: 0 };
         Ok(self.table(available, chosen, layout, fields, first.into()))
     }
 }
@@ -388,7 +399,15 @@ impl TextTable {
                 Some((line, text)) => (*line, text.as_str()),
                 None => match lines.next_line()? {
                     Some(next) => next,
-                    None => return Ok(None),
+                    None => {
+                        let Layout::Labelled { records, names, calendar, .. } = layout else { return Ok(None) };
+                        let Some(record) = records.finish().filter(|last| last.len() == names.len()) else {
+                            return Ok(None);
+                        };
+                        let values = values_of(names, record);
+                        let read = of_row.numbers(values.iter().map(String::as_str), calendar.as_mut(), row);
+                        return Ok(read.is_ok().then_some(lines.line()));
+                    }
                 },
             };
             let mut is_short = false;
@@ -415,20 +434,18 @@ impl TextTable {
                     *others += u64::from(is_other);
                     read.map(|()| !is_other)
                 }
-                Layout::Labelled { names, calendar, others } => {
-                    let row_of = labelled_row::parse(text);
-                    match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
-                        Some(row_of) => {
-                            is_short = row_of.len() < names.len();
-                            let values = values_of(names, row_of);
-                            of_row.numbers(values.iter().map(String::as_str), calendar.as_mut(), row).map(|()| true)
-                        }
-                        None => {
-                            *others += 1;
-                            Ok(false)
-                        }
+                Layout::Labelled { records, names, calendar, others } => match records.push(text) {
+                    Taken::Record(record) if record.iter().any(|(name, _)| names.contains(name)) => {
+                        is_short = record.len() < names.len();
+                        let values = values_of(names, record);
+                        of_row.numbers(values.iter().map(String::as_str), calendar.as_mut(), row).map(|()| true)
                     }
-                }
+                    Taken::Part => continue,
+                    Taken::Record(_) | Taken::Other => {
+                        *others += 1;
+                        Ok(false)
+                    }
+                },
                 Layout::Sentences { name, damaged, others } => match Sentence::parse(text) {
                     Some(sentence) if !sentence.is_intact => {
                         *damaged += 1;
@@ -480,34 +497,6 @@ impl TextTable {
     }
 }
 
-fn labelled_names(lines: &[(u64, String)]) -> Option<Vec<String>> {
-    let mut kinds: Vec<(Vec<String>, usize)> = Vec::new();
-    for row in lines.iter().filter_map(|(_, text)| labelled_row::parse(text)) {
-        let numbers = row.iter().filter(|(_, value)| number(value).is_some()).count();
-        let names: Vec<String> = row.into_iter().map(|(name, _)| name).collect();
-        match kinds.iter_mut().find(|(known, _)| *known == names) {
-            Some((_, count)) => *count += 1,
-            None if 2 * numbers >= names.len() => kinds.push((names, 1)),
-            None => {}
-        }
-    }
-    let (names, count) = kinds.into_iter().max_by_key(|(_, count)| *count)?;
-    (2 * count > lines.len()).then_some(names)
-}
-
-/// In the order of `names`; empty if missing.
-fn values_of(names: &[String], row: Vec<(String, String)>) -> Vec<String> {
-    let mut values = vec![String::new(); names.len()];
-    for (at, (name, value)) in row.into_iter().enumerate() {
-        // Mostly in one order.
-        let is_same = names.get(at) == Some(&name);
-        if let Some(at) = Some(at).filter(|_| is_same).or_else(|| names.iter().position(|known| *known == name)) {
-            values[at] = value;
-        }
-    }
-    values
-}
-
 #[derive(Debug)]
 struct RowFields {
     width: usize,
@@ -521,6 +510,8 @@ struct RowFields {
     are_values: Vec<bool>,
     /// A word for a value in the last row, with its column.
     word: Option<(usize, String)>,
+    /// Units of the columns.
+    units: Vec<Option<Unit>>,
 }
 
 impl RowFields {
@@ -535,7 +526,8 @@ impl RowFields {
             matches!(column.role, Role::Channel(_)) && column.unit.is_none_or(|unit| unit.base != COUNT)
         };
         let are_values = chosen.iter().map(is_value).collect();
-        Self { width, may_be_short, read, plain, are_values, word: None }
+        let units = chosen.iter().map(|column| column.unit).collect();
+        Self { width, may_be_short, read, plain, are_values, word: None, units }
     }
 
     /// Fast path of [`numbers`](Self::numbers) for plain lines, and the bytes of the line; `None` for any other.
@@ -600,7 +592,7 @@ impl RowFields {
                 read = rest;
                 let (known, reason): (_, fn(String) -> Reason) = match time_ns {
                     Some(time_ns) => (time_ns.map(Number::Integer), Reason::NotTime),
-                    None => (number(field), Reason::NotNumber),
+                    None => (number(field).or_else(|| in_unit(field, self.units[*at])), Reason::NotNumber),
                 };
                 match known {
                     Some(known) => row[*at] = known,
@@ -632,6 +624,13 @@ impl RowFields {
             },
         }
     }
+}
+
+/// A number with its unit, in the column's.
+fn in_unit(field: &str, of_column: Option<Unit>) -> Option<Number> {
+    let ((number, unit), own) = with_unit(field).zip(of_column)?;
+    let scaled = || Number::Real(number.value() * unit.factor / own.factor);
+    (unit.base == own.base).then(|| if unit.factor == own.factor { number } else { scaled() })
 }
 
 /// A number, but none of the `chosen` columns.

@@ -183,6 +183,11 @@ impl Lines {
         self.are_rows = true;
     }
 
+    /// The number of the last line.
+    pub(crate) fn line(&self) -> u64 {
+        self.line
+    }
+
     /// In memory; may be empty before the end.
     pub(crate) fn buffer(&self) -> &[u8] {
         if self.again { &[] } else { self.input.buffer() }
@@ -280,15 +285,16 @@ fn read_failure(error: io::Error) -> Reason {
     }
 }
 
-/// Without blanks and quotation marks.
+/// Without blanks and quotation marks of either kind.
 pub fn field(raw: &str) -> &str {
     // Mostly neither.
-    let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && *byte != b'"');
+    let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && !b"\"'".contains(byte));
     if is_bare(raw.as_bytes().first()) && is_bare(raw.as_bytes().last()) {
         return raw;
     }
     let trimmed = raw.trim();
-    trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed)
+    let inner = |mark: char| trimmed.strip_prefix(mark).and_then(|inner| inner.strip_suffix(mark));
+    inner('"').or_else(|| inner('\'')).unwrap_or(trimmed)
 }
 
 /// For messages.

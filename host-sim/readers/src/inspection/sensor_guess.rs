@@ -102,6 +102,8 @@ impl SensorGuess {
         } else if table.rate_hz.is_none() {
             found.iter_mut().for_each(|sensor| sensor.add_clock(facts));
         }
+        let has_numbers = |&(_, at, ..): &(_, usize, _, _)| facts[at].values.iter().any(|value| value.is_finite());
+        found.retain(|sensor| sensor.columns.iter().any(|of| !["time", "sample"].contains(&of.0) && has_numbers(of)));
         found.into_iter().map(|sensor| sensor.with_units(facts, profile, selection)).collect()
     }
 
@@ -369,7 +371,7 @@ impl RowLabel {
 }
 
 const OTHER_NAMES: &str = "lat lon alt easting northing quality yaw pitch roll heading speed press humid volt current batt covariance \
-    orientation quat magnetic position temp";
+    orientation quat magnetic position temp delta";
 
 /// By name and unit.
 fn may_be_inertial(column: &AvailableColumn) -> bool {

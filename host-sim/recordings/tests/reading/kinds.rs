@@ -4,6 +4,7 @@ use super::harness::{Reading, inspect, normal, read, read_file};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use recordings::Printable;
 use recordings::inspection::{InspectedTable, Proposal};
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use std::path::Path;
@@ -19,7 +20,8 @@ fn options(proposal: &Proposal) -> Vec<String> {
     let topic = proposal.topic.clone().unwrap_or_default();
     let options = [("--topic", topic), ("--columns", columns), ("--units", units)];
     let options = options.into_iter().filter(|(_, value)| !value.is_empty());
-    options.flat_map(|(name, value)| [name.to_owned(), value]).collect()
+    // As they are printed.
+    options.flat_map(|(name, value)| [name.to_owned(), Printable(&value).to_string()]).collect()
 }
 
 fn text(name: &str, content: &str, options: &[&str]) -> Reading {
@@ -187,6 +189,110 @@ fn rows_of_different_origin_are_several_sensors() {
             }
         }
     }
+}
+
+/// Writes the time, s, and the rates of a row, deg/s.
+type WriteRow = fn(f64, [f64; 3]) -> String;
+
+/// Text before the rows, the rows, and text behind them.
+const ROWS_OF_PROGRAMS: [(&str, WriteRow, &str); 15] = [
+    ("time,gyro_x,gyro_y,gyro_z\n", |t, [x, y, z]| format!("{t:.2} s,{x:.4} deg/s,{y:.4}°/s,{z:.4} deg/s\n"), ""),
+    (
+        "time_s,gyro_x,gyro_y,gyro_z\n",
+        |t, [x, y, z]| format!("{t:.2},{:.1} mdeg/s,{y:.5} deg/s,{z:.5} deg/s\n", 1e3 * x),
+        "",
+    ),
+    ("'time_s','gx','gy','gz'\n", |t, [x, y, z]| format!("'{t:.2}','{x:.4}','{y:.4}','{z:.4}'\n"), ""),
+    ("% a log\nx = [ ...\n", |t, [x, y, z]| format!("{t:.2} {x:.4} {y:.4} {z:.4};\n"), "];\n"),
+    ("x = [\n", |t, [x, y, z]| format!("{t:.2}, {x:.4}, {y:.4}, {z:.4};\n"), "];\n"),
+    ("const float rows[][4] = {\n", |t, [x, y, z]| format!("  {{ {t:.2}f, {x:.4}f, {y:.4}f, {z:.4}f }},\n"), "};\n"),
+    (
+        "time,channel,value\n",
+        |t, [x, y, z]| format!("{t:.2},gyro_x,{x:.4}\n{t:.2},gyro_y,{y:.4}\n{t:.2},gyro_z,{z:.4}\n"),
+        "",
+    ),
+    (
+        "t [s];sensor;value;unit\n",
+        |t, [x, y, z]| format!("{t:.2};gx;{x:.4};deg/s\n{t:.2};gy;{y:.4};deg/s\n{t:.2};gz;{z:.4};deg/s\n"),
+        "",
+    ),
+    (
+        "",
+        |t, [x, y, z]| {
+            let ms = (t * 1e3).round();
+            format!(
+                "stamp:\n  secs: {}\n  nsecs: {}\nangular_velocity:\n  x: {x:.4}\n  y: {y:.4}\n  z: {z:.4}\n---\n",
+                (ms / 1e3).floor(),
+                1e6 * (ms % 1e3)
+            )
+        },
+        "",
+    ),
+    (
+        "Sensor found!\n",
+        |t, [x, y, z]| format!("Time: {t:.2} s\nRotation X: {x:.4}, Y: {y:.4}, Z: {z:.4} deg/s\nSupply: 3.30 V\n\n"),
+        "",
+    ),
+    ("", |t, [x, y, z]| format!("I ({t:.0}) imu: t={t:.2} gx={x:.4} gy={y:.4} gz={z:.4}\n"), ""),
+    ("      t_s     gx     gy     gz\n", |t, [x, y, z]| format!("{:.0} {t:.2} {x:.4} {y:.4} {z:.4}\n", 100.0 * t), ""),
+    (
+        "0,1,0,250\n1,0,0,250\n0,0,1,250\n2,2,2,250\ntime_s,gx,gy,gz\n",
+        |t, [x, y, z]| format!("{t:.2},{x:.4},{y:.4},{z:.4}\n"),
+        "",
+    ),
+    (
+        "Sample Count,t_s,XGYRO_OUT,YGYRO_OUT,ZGYRO_OUT\n",
+        |t, [x, y, z]| format!("{:.0},{t:.2},{x:.4},{y:.4},{z:.4}\n", 100.0 * t),
+        "",
+    ),
+    (
+        "time_s,gyro_x [mdps],gyro_y [mdps],gyro_z [mdps]\n",
+        |t, rates| {
+            let cells = rates.map(|rate| {
+                let tenths = (1e4 * rate).round() as u64;
+                format!("\"{},{:03}.{}\"", tenths / 10_000, tenths / 10 % 1000, tenths % 10)
+            });
+            format!("{t:.2},{}\n", cells.join(","))
+        },
+        "",
+    ),
+];
+
+#[test]
+fn rows_are_read_as_programs_write_them() {
+    for (kind, (before, row, after)) in ROWS_OF_PROGRAMS.into_iter().enumerate() {
+        let mut normal = normal(kind as u64);
+        let rates = |_: u32| [(); 3].map(|()| 1.5 + RATE * normal());
+        let rates: Vec<[f64; 3]> = (0..ROWS).map(rates).collect();
+        let rows = rates.iter().zip(0..).map(|(rates, at)| row(f64::from(at) / 100.0, *rates)).collect::<String>();
+        let (_, found) = as_proposed(format!("{before}{rows}{after}").as_bytes(), &[]);
+        let [(proposal, read)] = found.as_slice() else { panic!("{kind}: {} sensors", found.len()) };
+        let (samples, hz) = (read.samples.len() as u32, read.rate_hz());
+        assert_eq!((samples, read.missing()), (ROWS, 0), "{kind}: {proposal:?} {:?}", read.notes);
+        assert!((hz / 100.0 - 1.0).abs() < 1e-6, "{kind}: {hz} Hz");
+        for channel in ["gyro_x", "gyro_y", "gyro_z"] {
+            assert!(is_near(read, channel, RATE), "{kind}: {} {proposal:?}", read.neighbours(channel));
+        }
+    }
+}
+
+/// Words of 16 bits in hexadecimal digits, and names in an encoding that is not told.
+#[test]
+fn words_in_hexadecimal_digits_and_names_of_another_encoding_are_read() {
+    let mut normal = normal(7);
+    let row = |row: u32| {
+        let words = [(); 3].map(|()| format!("0x{:04X}", (131.0 * RATE * normal()).round() as i16));
+        format!("{},{}\n", 10 * row, words.join(","))
+    };
+    let rows = (0..ROWS).map(row).collect::<String>();
+    // In Shift-JIS: angular rates, of which one byte is a control character by Latin-1.
+    let name = |axis: u8| [b"\x8a\x70\x91\xac\x93\x78".as_slice(), &[axis]].concat();
+    let heading = [b"t_ms".to_vec(), name(b'X'), name(b'Y'), name(b'Z')].join(&b',');
+    let (_, found) = as_proposed(&[&heading, b"\n".as_slice(), rows.as_bytes()].concat(), &[]);
+    let [(proposal, read)] = found.as_slice() else { panic!("{} sensors", found.len()) };
+    assert!(proposal.doubts.iter().any(|doubt| doubt.contains("counts of an unknown size")), "{proposal:?}");
+    assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0));
+    assert!(is_near(read, "gyro_y", 131.0 * RATE) && (read.rate_hz() / 100.0 - 1.0).abs() < 1e-6);
 }
 
 #[test]
