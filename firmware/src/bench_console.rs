@@ -80,26 +80,23 @@ fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<
 /// The line of a register that was read, also one of the dump.
 #[inline(never)]
 pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
-    let (name, address) = (register.name(), register.address());
     if register.access() == Access::Write {
-        return text!("{name} cannot be read");
+        return text!("{} cannot be read", register.name());
     }
-    match ask(Request::Read(register), state, board) {
-        Ok([value, ..]) => text!("{name:<10} {address:#04x}  {:#06x}  {value}", value as u16),
-        Err(error) => text!("{name:<10} {address:#04x}  {error}"),
-    }
+    let answer = ask(Request::Read(register), state, board);
+    register_line(register, answer.map(|[value, ..]| text!("{:#06x}  {value}", value as u16)))
 }
 
 pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
-    let (name, address) = (register.name(), register.address());
-    match ask(Request::Compare(register), state, board) {
-        Ok([first, others, bits, ..]) => text!(
-            "{name:<10} {address:#04x}  {:#06x}  {others} of {COMPARED_READS} differ, bits {:#06x}",
-            first as u16,
-            bits as u16
-        ),
-        Err(error) => text!("{name:<10} {address:#04x}  {error}"),
-    }
+    let differences = |[first, others, bits, ..]: [i16; 6]| {
+        text!("{:#06x}  {others} of {COMPARED_READS} differ, bits {:#06x}", first as u16, bits as u16)
+    };
+    register_line(register, ask(Request::Compare(register), state, board).map(differences))
+}
+
+fn register_line(register: Register, answer: Result<TextLine, TextLine>) -> TextLine {
+    let (Ok(answer) | Err(answer)) = answer;
+    text!("{:<10} {:#04x}  {answer}", register.name(), register.address())
 }
 
 /// Bits of GLOB_CMD that write the sensor's flash (data sheet Rev. B, pages 10 and 13).

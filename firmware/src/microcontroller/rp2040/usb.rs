@@ -1,4 +1,4 @@
-//! The USB port of an RP2040.
+//! The USB port of an RP2040. The feature `rp2040-e5` of the HAL, which works around RP2040-E5, is off: it would drive GPIO15.
 
 use super::flash::unique_id;
 use crate::bus_frame::wait_for;
