@@ -28,8 +28,8 @@ const EDF_ROUNDS: usize = 4;
 ///
 /// The first [`MAX_TERMS`] of `kinds` are used, each of which must occur once. Coefficients are in the unit of the
 /// curve (see [`NoiseTerm::unit`]), with 95 % bounds. They maximise the gamma likelihood of the [module](self). A curve
-/// without points, or of a channel that never changed, gives coefficients of 0. Of a curve with more than
-/// [`MAX_POINTS`] points only the octaves are used.
+/// without points, or of a channel that never changed, gives coefficients of 0. Only the octaves of a
+/// curve with more than [`MAX_POINTS`] points are used.
 ///
 /// # Cost
 /// | `fit::fit` | Cortex-M4F | Cortex-M0+ |
