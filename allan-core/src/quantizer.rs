@@ -44,7 +44,7 @@ pub struct Quantizer {
 /// Steps of [`Quantizer::for_samples`] in the standard deviation of white noise.
 const STEPS: f64 = 65_536.0;
 
-/// Values that are rounded together.
+/// Values that are rounded, or measured, together.
 const BLOCK: usize = 16;
 /// 1.5·2⁵²: a double of this size has no fraction, and the sum with an integer of 32 bits has that integer in its low bits.
 const SHIFT: f64 = 6_755_399_441_055_744.0;
@@ -97,21 +97,25 @@ impl Quantizer {
     /// ```
     #[must_use]
     pub fn for_samples(samples: impl IntoIterator<Item = f64>) -> Option<Self> {
-        let (mut origin, mut previous) = (None, f64::NAN);
-        // Four sums take turns, since an addition to the same sum must wait for the one before.
-        let (mut sums, mut count) = ([0.0; 4], 0_u64);
-        for value in samples {
-            if origin.is_none() && is_finite(value) {
-                origin = Some(value);
-            }
-            let difference = value - previous;
-            previous = value;
-            if is_finite(difference) {
-                sums[(count % 4) as usize] += difference * difference;
-                count += 1;
+        let mut samples = samples.into_iter().peekable();
+        let mut origin = None;
+        // Each place of a block has a sum of its own, since an addition to the same sum must wait for the one before.
+        let (mut sums, mut counts) = ([0.0; BLOCK], [0.0; BLOCK]);
+        // The last sample before a block, and its samples.
+        let mut block = [f64::NAN; BLOCK + 1];
+        while samples.peek().is_some() {
+            block[0] = block[BLOCK];
+            block[1..].fill(f64::NAN);
+            block[1..].iter_mut().zip(&mut samples).for_each(|(slot, sample)| *slot = sample);
+            origin = origin.or_else(|| block[1..].iter().copied().find(|&value| is_finite(value)));
+            for at in 0..BLOCK {
+                let difference = block[at + 1] - block[at];
+                let is_usable = abs(difference) <= f64::MAX; // false for NaN
+                sums[at] += if is_usable { difference * difference } else { 0.0 };
+                counts[at] += if is_usable { 1.0 } else { 0.0 };
             }
         }
-        let finest = sqrt(sums.iter().sum::<f64>() / (2.0 * count as f64)) * (1.0 / STEPS);
+        let finest = sqrt(sums.iter().sum::<f64>() / (2.0 * counts.iter().sum::<f64>())) * (1.0 / STEPS);
         // A normal number without its fraction is a power of two.
         let lsb = f64::from_bits(finest.to_bits() >> 52 << 52);
         if finest.is_normal() { Self::new(origin?, lsb) } else { None }

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! Measurement ─► CondensedRecord ─► PreprocessedRecord: curves ─► TracedPart: models of the whole ─► effects ─► causes ─► Report
-//!                     │                   └─► FirstHalf: models of the first half, errors on the second ──────────────┤
-//!                     └─► its first half ─► PreprocessedRecord ─► TracedPart ─► effects, to validate those of the whole ┘
+//!                     └─► its first half ─► PreprocessedRecord ─► TracedPart ─┬► effects, to validate those of the whole ┤
+//!                                                                             └► FirstHalf: errors on the second half ───┘
 //! ```
 //!
 //! Effects are named on the whole record. The errors before and after come from models of the first half alone, compared
@@ -38,9 +38,10 @@ use std::fmt;
 pub enum Stage {
     /// Looks for what the samples show before models are fitted to them.
     Preprocessing,
-    /// Fits the models of the whole record, and those of the first half, which are compared with the second.
+    /// Fits the models of the whole record, and those of the first half, which are compared with the second; names the effects of the
+    /// first half alone.
     Models,
-    /// Names the effects, in the whole record and in its first half alone.
+    /// Names the effects of the whole record.
     Effects,
     /// Assesses the models, and gathers the figures of the report.
     Assessment,
@@ -99,30 +100,25 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     let CondensedRecord { description, means: measurement, .. } = record;
     watch(Stage::Preprocessing);
     let half = record.first_half();
+    let half = PreprocessedRecord::new(&half);
     let (whole, halves) = PreprocessedRecord::with_halves(record, &half);
     watch(Stage::Models);
+    let of_half = || {
+        let models = half.fit();
+        // The findings of the first half alone are compared with those of the whole record.
+        let effects = half.effects(&models);
+        (effects, FirstHalf::new(&whole, &half, models, &halves))
+    };
     // The two run side by side: while one waits for its slowest channel, the other goes on.
-    let ((first_half, epochs), mut models) =
-        parallel::both(|| FirstHalf::fit(&whole, &half, &halves), || whole.fit(None));
+    let ((effects_of_half, (first_half, epochs)), mut models) = parallel::both(of_half, || whole.fit());
     models.take_terms_that_held(&first_half.part, &whole.estimators.second);
     models.add_lines_of_spectrum();
     models.take_coefficients_of_samples();
     watch(Stage::Effects);
     let effects = whole.effects(&models);
-    // The findings of the first half alone are compared with those of the whole record.
-    let of_half = || {
-        if effects.iter().all(Vec::is_empty) {
-            return effects.clone();
-        }
-        let half = PreprocessedRecord::new(&half);
-        half.effects(&half.fit(Some(&first_half.part)))
-    };
-    let reports = || {
-        let channels = channel_reports((&whole, &models), (&first_half, &halves), &epochs, &effects);
-        (common_mode_regression(measurement, &channels), channels)
-    };
-    let (effects_of_half, (common_mode, mut channels)) = parallel::both(of_half, reports);
     watch(Stage::Assessment);
+    let mut channels = channel_reports((&whole, &models), (&first_half, &halves), &epochs, &effects);
+    let common_mode = common_mode_regression(measurement, &channels);
     let duration_s = description.periods as f64 * description.period_s();
     let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
     let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);

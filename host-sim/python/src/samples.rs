@@ -13,10 +13,14 @@ pub(crate) type Grid = (f64, f64);
 /// Number of samples converted together; their counts stay in the nearest cache.
 const BLOCK: usize = 4096;
 
-/// Declares the dtypes that are read without a copy. Each has the bits of a sample that do not fit a count; they are 0 if the sample is a
-/// count.
+/// Automatic steps of single precision over those of double precision: 1/256 of the deviation of white noise, to whose variance rounding adds
+/// 1.3·10⁻⁶. Differences then have few bits, which are squared in half of the time.
+const SINGLE_PRECISION: f64 = 256.0;
+
+/// Declares the dtypes that are read without a copy. Floats have their automatic step over that of [`Quantizer::for_samples`]; integers have
+/// none. Each has the bits of a sample that do not fit a count; they are 0 if the sample is a count.
 macro_rules! dtypes {
-    ($($name:ident $type:ty, $is_float:literal, |$value:ident| $beyond:expr;)*) => {
+    ($($name:ident $type:ty, $step:expr, |$value:ident| $beyond:expr;)*) => {
         /// An array of samples that Python holds.
         pub(crate) enum Array<'py> {
             $($name(PyReadonlyArray1<'py, $type>),)*
@@ -55,16 +59,18 @@ macro_rules! dtypes {
                 }
             }
 
-            /// The grid of [`Quantizer::for_samples`], if these are floats.
+            /// The automatic grid, if these are floats.
             fn automatic_grid(self) -> Option<Grid> {
-                let quantizer = match self {
-                    $(Self::$name(values) if $is_float => match values.as_slice() {
-                        Some(values) => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
-                        None => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
-                    },)*
-                    _ => None,
+                let (quantizer, step): (_, Option<f64>) = match self {
+                    $(Self::$name(values) => (
+                        $step.and_then(|_: f64| match values.as_slice() {
+                            Some(values) => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
+                            None => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
+                        }),
+                        $step,
+                    ),)*
                 };
-                quantizer.map(|quantizer| (quantizer.origin(), quantizer.lsb()))
+                quantizer.zip(step).map(|(quantizer, step)| (quantizer.origin(), quantizer.lsb() * step))
             }
         }
 
@@ -79,16 +85,16 @@ macro_rules! dtypes {
     };
 }
 dtypes! {
-    Int8 i8, false, |_value| 0;
-    Int16 i16, false, |_value| 0;
-    Int32 i32, false, |_value| 0;
-    Int64 i64, false, |value| (value.wrapping_add(1 << 31) as u64) >> 32;
-    UInt8 u8, false, |_value| 0;
-    UInt16 u16, false, |_value| 0;
-    UInt32 u32, false, |value| u64::from(value >> 31);
-    UInt64 u64, false, |value| value >> 31;
-    Float32 f32, true, |_value| 1;
-    Float64 f64, true, |_value| 1;
+    Int8 i8, None, |_value| 0;
+    Int16 i16, None, |_value| 0;
+    Int32 i32, None, |_value| 0;
+    Int64 i64, None, |value| (value.wrapping_add(1 << 31) as u64) >> 32;
+    UInt8 u8, None, |_value| 0;
+    UInt16 u16, None, |_value| 0;
+    UInt32 u32, None, |value| u64::from(value >> 31);
+    UInt64 u64, None, |value| value >> 31;
+    Float32 f32, Some(SINGLE_PRECISION), |_value| 1;
+    Float64 f64, Some(1.0), |_value| 1;
 }
 
 /// Counts of the first samples of a part of an array.

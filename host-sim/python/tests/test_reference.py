@@ -108,6 +108,18 @@ def test_floats_lose_what_rounding_to_the_grid_loses() -> None:
     assert (abs(curve.adev[:8] / deviations - 1) < 5 * 2**-16 / np.sqrt(12 * len(values) / curve.n[:8])).all()
 
 
+def test_single_precision_loses_what_rounding_to_its_coarser_grid_loses() -> None:
+    values = np.random.default_rng(7).normal(9.81, 0.01, 100_000).astype(np.float32)
+    curve = imunoise.curve(values, 100.0, overlap=1)
+    _, deviations, _, numbers = allantools.adev(values.astype(float), rate=100.0, data_type="freq", taus=curve.tau)
+    # A step is 1/256 of the deviation or less, and its rounding error, step/√12, is independent of the noise. The variance
+    # differs by twice their covariance, which is that of about half as many independent differences; and by the error's own.
+    rounding = 1 / 256 / np.sqrt(12)
+    allowed = 5 * 2 * rounding / np.sqrt(numbers / 2) + 2 * rounding**2
+    assert np.all(np.abs((curve.adev / deviations) ** 2 - 1) < allowed)
+    assert not np.allclose(curve.adev, deviations, rtol=1e-9)  # the grid is the coarse one
+
+
 def test_white_noise_has_its_textbook_degrees_of_freedom() -> None:
     counts = np.random.default_rng(6).normal(0.0, 100.0, 1 << 17).round()
     curve = imunoise.curve(counts.astype(np.int32), 1.0)

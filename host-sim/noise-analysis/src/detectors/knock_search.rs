@@ -13,12 +13,16 @@ use crate::parallel::in_parallel;
 use crate::samples::series::Series;
 use std::ops::Range;
 
-pub(crate) struct SearchedChannel<'a> {
-    /// The first of `parts`, by which the channel's rules are fitted.
-    pub fitted: &'a Series,
-    /// The parts in which knocks are sought, in the order of time; none affects another one.
-    pub parts: Vec<&'a Series>,
+/// A channel in the part of a recording that its rules are fitted to.
+pub(crate) struct SearchedChannel {
+    pub series: Series,
     pub can_show_spikes: bool,
+}
+
+/// The rules of channels, fitted to one part of a recording, by which knocks are sought there and in other parts.
+pub(crate) struct KnockSearch {
+    knocks: Vec<KnockRule>,
+    spikes: Vec<Option<SpikeRule>>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -36,63 +40,65 @@ struct StandingOut<'a> {
     samples: u64,
 }
 
-/// The loud stretches of each channel, for each part; a first Allan variance of `dithered_avar_counts2` dithers.
-pub(crate) fn find(
-    channels: &[SearchedChannel],
-    repeated: &[u64],
-    dithered_avar_counts2: f64,
-) -> Vec<Vec<LoudStretches>> {
-    let rules = in_parallel(channels, |of| KnockRule::fit(of.fitted, dithered_avar_counts2));
-    let parts = channels.first().map_or(0, |of| of.parts.len());
-    let series_of = |part: usize| channels.iter().map(move |of| of.parts[part].clone()).collect::<Vec<Series>>();
-    let long: Vec<Vec<Vec<Knock>>> =
-        (0..parts).map(|part| find_by(&rules, &series_of(part), BlockSize::Many)).collect();
-    let places: Vec<usize> = (0..channels.len()).collect();
-    let spike_rules: Vec<Option<SpikeRule>> = in_parallel(&places, |&of| {
-        let SearchedChannel { fitted, can_show_spikes, .. } = channels[of];
-        let loud = slots_within(fitted, &long.first()?[of]);
-        if can_show_spikes { SpikeRule::fit(&fitted.clone().without(&loud).without(repeated)) } else { None }
-    });
-    (0..parts)
-        .zip(long)
-        .map(|(part, long)| find_in_part(&series_of(part), (&rules, &spike_rules), long, repeated))
-        .collect()
-}
-
-fn find_in_part(
-    series: &[Series],
-    (rules, spike_rules): (&[KnockRule], &[Option<SpikeRule>]),
-    long: Vec<Vec<Knock>>,
-    repeated: &[u64],
-) -> Vec<LoudStretches> {
-    let mut knocks = long;
-    let places: Vec<usize> = (0..series.len()).collect();
-    let mut quiet: Vec<Series> =
-        series.iter().zip(&knocks).map(|(of, knocks)| of.clone().without(&slots_within(of, knocks))).collect();
-    let standing_out: Vec<Option<StandingOut>> = in_parallel(&places, |&of| {
-        Some(StandingOut::find(spike_rules[of].as_ref()?, &rules[of], &quiet[of].clone().without(repeated)))
-    });
-    let mut found = find_by(rules, &quiet, BlockSize::Few);
-    let by_chance = |(of, found): (&Option<StandingOut>, &Vec<Knock>)| -> Vec<u64> {
-        of.iter().flat_map(|of| found.iter().map(move |knock| of.by_chance_in(knock))).flatten().collect()
-    };
-    let by_chance: Vec<Vec<u64>> = standing_out.iter().zip(&found).map(by_chance).collect();
-    if by_chance.iter().any(|of| !of.is_empty()) {
-        quiet = quiet.into_iter().zip(by_chance).map(|(series, of)| series.without(&of)).collect();
-        found = find_by(rules, &quiet, BlockSize::Few);
+impl KnockSearch {
+    /// The rules by a part of a recording, and the loud stretches of each channel there; a first Allan variance of
+    /// `dithered_avar_counts2` dithers.
+    pub(crate) fn fit(
+        channels: &[SearchedChannel],
+        repeated: &[u64],
+        dithered_avar_counts2: f64,
+    ) -> (Self, Vec<LoudStretches>) {
+        let knocks = in_parallel(channels, |of| KnockRule::fit(&of.series, dithered_avar_counts2));
+        let series: Vec<Series> = channels.iter().map(|of| of.series.clone()).collect();
+        let long = find_by(&knocks, &series, BlockSize::Many);
+        let places: Vec<usize> = (0..channels.len()).collect();
+        let spikes = in_parallel(&places, |&of| {
+            let SearchedChannel { series, can_show_spikes } = &channels[of];
+            let without = || series.clone().without(&slots_within(series, &long[of])).without(repeated);
+            if *can_show_spikes { SpikeRule::fit(&without()) } else { None }
+        });
+        let search = Self { knocks, spikes };
+        let found = search.find_beside(long, &series, repeated);
+        (search, found)
     }
-    add(&mut knocks, found);
-    let mut add_disturbances = |of: &dyn Fn(&StandingOut) -> Vec<Disturbance>| {
-        for ((series, found), knocks) in series.iter().zip(&standing_out).zip(&mut knocks) {
-            let disturbances = found.as_ref().map(of).unwrap_or_default();
-            Knock::add_disturbances(knocks, disturbances, series.values.len());
+
+    /// The loud stretches of each channel in another part of the recording.
+    pub(crate) fn find(&self, series: &[Series], repeated: &[u64]) -> Vec<LoudStretches> {
+        self.find_beside(find_by(&self.knocks, series, BlockSize::Many), series, repeated)
+    }
+
+    /// The same beside the `long` knocks of each channel.
+    fn find_beside(&self, long: Vec<Vec<Knock>>, series: &[Series], repeated: &[u64]) -> Vec<LoudStretches> {
+        let Self { knocks: rules, spikes: spike_rules } = self;
+        let mut knocks = long;
+        let places: Vec<usize> = (0..series.len()).collect();
+        let mut quiet: Vec<Series> =
+            series.iter().zip(&knocks).map(|(of, knocks)| of.clone().without(&slots_within(of, knocks))).collect();
+        let standing_out: Vec<Option<StandingOut>> = in_parallel(&places, |&of| {
+            Some(StandingOut::find(spike_rules[of].as_ref()?, &rules[of], &quiet[of].clone().without(repeated)))
+        });
+        let mut found = find_by(rules, &quiet, BlockSize::Few);
+        let by_chance = |(of, found): (&Option<StandingOut>, &Vec<Knock>)| -> Vec<u64> {
+            of.iter().flat_map(|of| found.iter().map(move |knock| of.by_chance_in(knock))).flatten().collect()
+        };
+        let by_chance: Vec<Vec<u64>> = standing_out.iter().zip(&found).map(by_chance).collect();
+        if by_chance.iter().any(|of| !of.is_empty()) {
+            quiet = quiet.into_iter().zip(by_chance).map(|(series, of)| series.without(&of)).collect();
+            found = find_by(rules, &quiet, BlockSize::Few);
         }
-        knocks.iter().flatten().map(|knock| knock.slots.clone()).collect::<Vec<Range<u64>>>()
-    };
-    let known = add_disturbances(&|found| found.disturbances.clone());
-    add_disturbances(&|found| found.parts_of(&known));
-    let by_itself = standing_out.into_iter().map(|found| found.map(|of| of.by_itself).unwrap_or_default());
-    knocks.into_iter().zip(by_itself).map(|(knocks, by_itself)| LoudStretches { knocks, by_itself }).collect()
+        add(&mut knocks, found);
+        let mut add_disturbances = |of: &dyn Fn(&StandingOut) -> Vec<Disturbance>| {
+            for ((series, found), knocks) in series.iter().zip(&standing_out).zip(&mut knocks) {
+                let disturbances = found.as_ref().map(of).unwrap_or_default();
+                Knock::add_disturbances(knocks, disturbances, series.values.len());
+            }
+            knocks.iter().flatten().map(|knock| knock.slots.clone()).collect::<Vec<Range<u64>>>()
+        };
+        let known = add_disturbances(&|found| found.disturbances.clone());
+        add_disturbances(&|found| found.parts_of(&known));
+        let by_itself = standing_out.into_iter().map(|found| found.map(|of| of.by_itself).unwrap_or_default());
+        knocks.into_iter().zip(by_itself).map(|(knocks, by_itself)| LoudStretches { knocks, by_itself }).collect()
+    }
 }
 
 fn add(knocks: &mut [Vec<Knock>], found: Vec<Vec<Knock>>) {

@@ -1,6 +1,6 @@
 //! The detector of knocks on simulated channels: false alarms and detections.
 
-use super::knock_search::{self, SearchedChannel};
+use super::knock_search::{KnockSearch, SearchedChannel};
 use super::knocks::{BlockSize, Knock, KnockRule, find_by};
 use super::noise_levels::tests::samples_read;
 use crate::effects::Effect;
@@ -120,9 +120,10 @@ fn assert_quiet(name: &str, record: impl Fn(u64) -> Series + Sync) {
 }
 
 fn find(channels: &[Series]) -> Vec<Vec<Knock>> {
-    let searched = |series| SearchedChannel { fitted: series, parts: vec![series], can_show_spikes: true };
-    let found = knock_search::find(&channels.iter().map(searched).collect::<Vec<SearchedChannel>>(), &[], DITHERED);
-    found.into_iter().flatten().map(|of| of.knocks).collect()
+    let searched = |series: &Series| SearchedChannel { series: series.clone(), can_show_spikes: true };
+    let channels: Vec<SearchedChannel> = channels.iter().map(searched).collect();
+    let (_, found) = KnockSearch::fit(&channels, &[], DITHERED);
+    found.into_iter().map(|of| of.knocks).collect()
 }
 
 fn records_with_a_knock(record: impl Fn(u64) -> Series + Sync) -> usize {

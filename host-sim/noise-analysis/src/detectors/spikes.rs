@@ -192,6 +192,13 @@ impl SpikeRule {
         Some(Self { interpolation, prediction, least, difference: typical_difference(series) })
     }
 
+    /// Looks for spikes in the `series` that the rule was fitted to, but for stretches in which its noise is `louder` by itself. `None` if
+    /// there are none, or if jumps of the bias are at least as frequent.
+    pub(crate) fn detect(&self, series: &Series, louder: &[Range<u64>]) -> Option<Detection> {
+        let looked_at = (series.duration_s() / 3600.0, series.values.len() as u64);
+        self.detection(&self.find(series).out_of_noise().outside(louder), looked_at, series.unit)
+    }
+
     /// Sample periods outside of `louder` noise, in ascending order; none if jumps of the bias are as frequent.
     pub(crate) fn slots(&self, series: &Series, louder: &[Range<u64>]) -> Vec<u64> {
         let found = self.find_around(series, self.interpolation.mean).out_of_noise().outside(louder);
@@ -326,13 +333,6 @@ impl Disturbance {
         self.count += later.count;
         self.p_value = self.p_value.min(later.p_value);
     }
-}
-
-/// Looks for spikes in one channel, but for stretches in which its noise is `louder` by itself. `None` if there are none, or if jumps of the bias are at least as frequent.
-pub(crate) fn find(series: &Series, louder: &[Range<u64>]) -> Option<Detection> {
-    let rule = SpikeRule::fit(series)?;
-    let looked_at = (series.duration_s() / 3600.0, series.values.len() as u64);
-    rule.detection(&rule.find(series).out_of_noise().outside(louder), looked_at, series.unit)
 }
 
 /// Probability that the next of `events` independent events follows within [`REACH`] sample periods.

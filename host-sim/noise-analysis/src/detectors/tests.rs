@@ -1,7 +1,8 @@
 //! Every detector on recordings of the virtual sensor, with and without the effect.
 
 use super::bias::{self, BiasChanges};
-use super::{effective_lsb, spikes};
+use super::effective_lsb;
+use super::spikes::SpikeRule;
 use crate::bounds::Parameter;
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::findings::{Correction, Detection};
@@ -15,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Exp1, StandardNormal, StudentT};
 use simulation::{HostClock, Simulation};
 use std::f64::consts::TAU;
+use std::ops::Range;
 use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario, TemperatureProfile};
 
 const GYRO: Channel = Channel::GyroY;
@@ -23,6 +25,10 @@ const SENSED_GYRO: OutputRegister = OutputRegister::GyroY;
 /// At 204.8 Hz with the paper's N and rounding to 0.05 deg/s.
 fn white() -> f64 {
     (0.0368f64.powi(2) * 204.8 + 0.05f64.powi(2) / 12.0).sqrt()
+}
+
+fn find_spikes(series: &Series, louder: &[Range<u64>]) -> Option<Detection> {
+    SpikeRule::fit(series)?.detect(series, louder)
 }
 
 struct Case {
@@ -52,7 +58,7 @@ impl Case {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
             let BiasChanges { step, ramp, .. } = bias_changes(&series);
-            [spikes::find(&series, &[]), step, ramp]
+            [find_spikes(&series, &[]), step, ramp]
         });
         let common = [
             sampling_faults::lost_samples_of(&self.measurement),
@@ -101,7 +107,7 @@ fn spikes_are_counted_measured_and_removed() {
     let case =
         Case::hiding(vec![InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
     let series = case.series(GYRO);
-    let detection = spikes::find(&series, &[]).unwrap();
+    let detection = find_spikes(&series, &[]).unwrap();
     assert_eq!(detection.effect.name(), "spikes");
     assert_covers(&detection, "rate", 300.0);
     assert_covers(&detection, "size", size);
@@ -111,8 +117,8 @@ fn spikes_are_counted_measured_and_removed() {
     let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
     assert_eq!(corrected.values.len(), series.values.len() - positions.len());
     assert_eq!(corrected.slots.last(), series.slots.last());
-    assert_eq!(spikes::find(&corrected, &[]), None);
-    assert_eq!(spikes::find(&case.series(Channel::GyroX), &[]), None);
+    assert_eq!(find_spikes(&corrected, &[]), None);
+    assert_eq!(find_spikes(&case.series(Channel::GyroX), &[]), None);
     assert_eq!(bias_changes(&series).step, None);
 }
 
@@ -121,10 +127,10 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
     // Behind the filter, so added to the recorded samples.
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 3 }], 200.0, 3);
     let mut series = case.series(GYRO);
-    assert_eq!(spikes::find(&series, &[]), None);
+    assert_eq!(find_spikes(&series, &[]), None);
     // Two averages of 8 leave 0.29 of the white noise: 1.7 σ of the samples, far more than the interpolation error.
     series.values_mut()[20_000] += 0.5 * white();
-    let detection = spikes::find(&series, &[]).unwrap();
+    let detection = find_spikes(&series, &[]).unwrap();
     assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
 }
 
@@ -133,7 +139,7 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
 fn spikes_before_the_filter_are_counted() {
     let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 25.0 * white() };
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 5);
-    assert_covers(&spikes::find(&case.series(GYRO), &[]).expect("50 spikes"), "rate", 300.0);
+    assert_covers(&find_spikes(&case.series(GYRO), &[]).expect("50 spikes"), "rate", 300.0);
 }
 
 /// 4 standard deviations of the interpolation error, 7.8 of the prediction error.
@@ -141,13 +147,13 @@ fn spikes_before_the_filter_are_counted() {
 fn a_prediction_shows_spikes_that_an_interpolation_does_not() {
     let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 9.0 * white() };
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 7);
-    let detection = spikes::find(&case.series(GYRO), &[]).expect("50 spikes");
+    let detection = find_spikes(&case.series(GYRO), &[]).expect("50 spikes");
     assert_covers(&detection, "rate", 300.0);
     // The first changed sample has a quarter of it.
     assert_covers(&detection, "size", 0.25 * 9.0 * white());
     for (taps_log2, seed) in (1..=3).flat_map(|taps_log2| (10..15).map(move |seed| (taps_log2, seed))) {
         let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2 }], 200.0, seed);
-        assert_eq!(spikes::find(&case.series(GYRO), &[]), None);
+        assert_eq!(find_spikes(&case.series(GYRO), &[]), None);
     }
 }
 
@@ -161,7 +167,7 @@ fn a_blow_is_not_interpolated_from_its_own_samples() {
         for (at, value) in series.values_mut()[40_000..].iter_mut().enumerate() {
             *value += 30.0 * white() * blow(at as f64 / 204.8);
         }
-        let rule = spikes::SpikeRule::fit(&series).expect("samples that change");
+        let rule = SpikeRule::fit(&series).expect("samples that change");
         let (_, disturbances) = rule.separate(rule.find(&series), series.values.len() as u64);
         let [found] = disturbances.as_slice() else { panic!("{disturbances:?}") };
         // Six times the noise after 2 or 4 samples, less after 32 or 57.
@@ -181,11 +187,11 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
         level = kept * level + (1.0 - kept * kept).sqrt() * step;
         *value += white() * 2f64.powf(level) * normal;
     }
-    assert_eq!(spikes::find(&series, &[]), None);
+    assert_eq!(find_spikes(&series, &[]), None);
     let spikes = [10_000, 30_000, 50_000];
     spikes.iter().for_each(|&at| series.values_mut()[at] += 60.0 * white());
     assert_eq!(
-        spikes::find(&series, &[]).unwrap().correction,
+        find_spikes(&series, &[]).unwrap().correction,
         Some(Correction::Exclude(spikes.map(|at| at as u64).into()))
     );
 }
@@ -200,7 +206,7 @@ fn other_spikes_make_no_spikes_of_louder_noise() {
     }
     let spikes: Vec<u64> = (0..100).map(|number| 25_000 + 400 * number).collect();
     spikes.iter().for_each(|&at| series.values_mut()[at as usize] += 60.0 * white());
-    let found = spikes::find(&series, &[]).expect("spikes");
+    let found = find_spikes(&series, &[]).expect("spikes");
     let (louder, others): (Vec<u64>, Vec<u64>) = found.excluded().iter().partition(|slot| **slot < 21_000);
     assert_eq!(others, spikes);
     assert!(louder.len() < 8, "{louder:?}");
@@ -228,12 +234,12 @@ fn noise_with_heavy_tails_has_no_spikes() {
         }
     };
     for kind in ["exponential", "Laplace", "Student"] {
-        let found = (0..20).filter(|seed| spikes::find(&noise(kind, *seed), &[]).is_some()).count();
+        let found = (0..20).filter(|seed| find_spikes(&noise(kind, *seed), &[]).is_some()).count();
         assert_eq!(found, 0, "{kind}");
     }
     let mut with_spikes = noise("exponential", 30);
     (0..10).for_each(|number| with_spikes.values_mut()[1500 + 2500 * number] += 200.0);
-    let found = spikes::find(&with_spikes, &[]).expect("ten spikes");
+    let found = find_spikes(&with_spikes, &[]).expect("ten spikes");
     assert_eq!(found.effect.parameters()["size"].value.round(), 200.0);
     assert_eq!(found.excluded().len(), 10);
 }
@@ -247,7 +253,7 @@ fn a_step_is_located_measured_and_removed() {
     assert_covers(&detection, "time", 333.0);
     assert_covers(&detection, "size", -0.15);
     assert!((value_of(&detection, "size").value / -0.15 - 1.0).abs() < 0.2);
-    assert_eq!(spikes::find(&series, &[]), None);
+    assert_eq!(find_spikes(&series, &[]), None);
     assert_eq!(bias_changes(&series.corrected(detection.correction.as_ref().unwrap())).step, None);
     assert_eq!(bias_changes(&case.series(Channel::GyroZ)).step, None);
 }

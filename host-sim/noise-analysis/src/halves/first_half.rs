@@ -1,4 +1,4 @@
-//! Models of the first half of a recording, and their errors on the second half, which they have not seen.
+//! Models of the first half of a recording, fitted to be compared with the second half, which they have not seen, and their errors on it.
 
 use crate::OCTAVES;
 use crate::fit::channel_fit::ChannelFit;
@@ -7,10 +7,9 @@ use crate::fit::event_share::EventShare;
 use crate::fit::sample_coefficients::{SamplesOfCurve, by_samples};
 use crate::fit::signal_share::SignalShare;
 use crate::halves::preprocessed_record::PreprocessedRecord;
-use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
+use crate::halves::traced_part::{PartData, TracedPart};
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
 use crate::parallel::{self, per_channel};
-use crate::record::condensed_record::CondensedRecord;
 use crate::record::estimators::{HalfEstimators, RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
 use crate::report::{
@@ -44,36 +43,28 @@ pub(crate) struct Epochs {
 }
 
 impl FirstHalf {
-    /// The models, and how the noise changes; `half` is the first half of the `whole` record, `estimators` are those of the halves.
-    pub(crate) fn fit(
+    /// Prepares the models of the `half` for what follows it in the `whole` record, and tells how the noise changes; `estimators` are
+    /// those of the halves.
+    pub(crate) fn new(
         whole: &PreprocessedRecord,
-        half: &CondensedRecord,
+        half: &PreprocessedRecord,
+        mut part: TracedPart,
         estimators: &HalfEstimators,
     ) -> (Self, Epochs) {
         let PreprocessedRecord { preprocessing, record, .. } = whole;
-        let series = whole.series_without(Exclusion::ByFirstHalf);
+        let series = whole.series_by_first_half();
         let middle = whole.measurement().middle();
-        let halves = series.map(|series| series.before(middle));
-        let biases = per_channel(series.ids(), |channel| BiasByBlocks {
-            has_ramp: preprocessing.has_ramp(channel, Exclusion::ByFirstHalf),
-            sensitivities: preprocessing.sensitivities(channel, Exclusion::ByFirstHalf).to_vec(),
-        });
-        let samples =
-            PartSamples { record: half, series: &halves, biases: biases.clone(), known: None, seeks_levels: false };
-        let profile = &whole.measurement().profile;
-        let data = PartData { profile, curves: &estimators.ruled[0], samples: Some(samples) };
-        // The filter of the whole record is the one that is reported.
-        let mut part = TracedPart::fit(&data);
         let events = per_channel(series.ids(), |channel| {
-            let (excluded, screened) =
-                (preprocessing.excluded_events(channel, middle), &half.channels[channel].screened);
+            let excluded = preprocessing.excluded_events(channel, middle);
+            let screened = &half.record.channels[channel].screened;
             if excluded.is_empty() && screened.is_empty() {
                 return EventShare::default();
             }
             let fit = &part.channels[channel].fit;
-            let with = fit.signals.left_of(&fit.covariates.compensated(&estimators.foretold[0], channel));
+            let [with, without] = [&estimators.foretold[0], &estimators.ruled[0]]
+                .map(|of| fit.signals.left_of(&fit.covariates.compensated(of, channel)));
             let recorded = preprocessing.series(whole.measurement(), channel, Exclusion::BiasOfFirstHalf);
-            EventShare::of_first_half((&recorded.before(middle), &excluded), screened, (&with, &fit.curve))
+            EventShare::of_first_half((&recorded.before(middle), &excluded), screened, (&with, &without))
         });
         let channels = per_channel(series.ids(), |channel| {
             let (fit, own) = (&part.channels[channel].fit, &series[channel]);
@@ -94,13 +85,13 @@ impl FirstHalf {
         });
         part.take_coefficients_of_samples();
         let raw = per_channel(series.ids(), |channel| {
-            let (bias, curves) = (&biases[channel], &estimators.recorded[0]);
+            let (bias, curves) = (half.bias(channel), &estimators.recorded[0]);
             let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
             let own = preprocessing.series(whole.measurement(), channel, Exclusion::Nothing).before(middle);
-            let rest = covariates.compensated_series(&own, &halves, middle).unwrap_or(own);
+            let rest = covariates.compensated_series(&own, &half.series, middle).unwrap_or(own);
             let ChannelFit { covariates, before, .. } = ChannelFit::fit_baseline(covariates);
-            let is_screened = half.channels[channel].samples.is_screened;
-            let spectrum = half.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
+            let is_screened = half.record.channels[channel].samples.is_screened;
+            let spectrum = half.record.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
             let rest = UniformSeries::from_series(&rest).with_rounding(covariates.rounding().clone());
             let samples = SamplesOfCurve { rest: &rest, spectrum: spectrum.as_ref() };
             by_samples(&covariates.curve, &before, samples).unwrap_or(before)

@@ -37,9 +37,12 @@ impl<'a> PreprocessedRecord<'a> {
     }
 
     /// The same, and the estimators of both halves by what the `first_half` shows.
-    pub(crate) fn with_halves(record: &'a CondensedRecord<'a>, first_half: &CondensedRecord) -> (Self, HalfEstimators) {
-        let preprocessing = Preprocessing::detect(record, Some(first_half));
-        let (estimators, halves) = RecordEstimators::estimate_with_halves(record, first_half, &preprocessing);
+    pub(crate) fn with_halves(
+        record: &'a CondensedRecord<'a>,
+        first_half: &PreprocessedRecord,
+    ) -> (Self, HalfEstimators) {
+        let preprocessing = Preprocessing::detect(record, Some(&first_half.preprocessing));
+        let (estimators, halves) = RecordEstimators::estimate_with_halves(record, first_half.record, &preprocessing);
         (Self::with(record, preprocessing, estimators), halves)
     }
 
@@ -55,17 +58,21 @@ impl<'a> PreprocessedRecord<'a> {
         Self { record, preprocessing, estimators, series, motions }
     }
 
-    /// The models of the whole record; of samples that a `known` part has too, what they show is taken from there.
-    pub(crate) fn fit(&self, known: Option<&TracedPart>) -> TracedPart {
-        let (measurement, preprocessing) = (self.measurement(), &self.preprocessing);
-        let bias = |channel: ChannelId| BiasByBlocks {
-            has_ramp: preprocessing.has_ramp(channel, Exclusion::ByWhole),
-            sensitivities: preprocessing.sensitivities(channel, Exclusion::ByWhole).to_vec(),
-        };
-        let biases = measurement.ids().map(bias).collect();
-        let samples = PartSamples { record: self.record, series: &self.series, biases, known, seeks_levels: true };
+    /// The models of the record.
+    pub(crate) fn fit(&self) -> TracedPart {
+        let measurement = self.measurement();
+        let biases = measurement.ids().map(|channel| self.bias(channel)).collect();
+        let samples = PartSamples { record: self.record, series: &self.series, biases };
         let data = PartData { profile: &measurement.profile, curves: &self.estimators.both, samples: Some(samples) };
         TracedPart::fit(&data)
+    }
+
+    /// The findings in the block means of a channel.
+    pub(crate) fn bias(&self, channel: ChannelId) -> BiasByBlocks {
+        BiasByBlocks {
+            has_ramp: self.preprocessing.has_ramp(channel),
+            sensitivities: self.preprocessing.sensitivities(channel).to_vec(),
+        }
     }
 
     /// The samples, or their means.
@@ -73,11 +80,11 @@ impl<'a> PreprocessedRecord<'a> {
         &self.record.means
     }
 
-    /// The series of the channels, without the samples of `exclusion`.
-    pub(crate) fn series_without(&self, exclusion: Exclusion) -> PerChannel<Series> {
+    /// The series of the channels by the rules of the first half.
+    pub(crate) fn series_by_first_half(&self) -> PerChannel<Series> {
         per_channel(self.series.ids(), |channel| {
-            let is_same = self.preprocessing.leaves_the_same(channel, exclusion, Exclusion::ByWhole);
-            let other = || self.preprocessing.series(self.measurement(), channel, exclusion);
+            let is_same = self.preprocessing.leaves_the_same(channel, Exclusion::ByFirstHalf, Exclusion::ByWhole);
+            let other = || self.preprocessing.series(self.measurement(), channel, Exclusion::ByFirstHalf);
             if is_same { self.series[channel].clone() } else { other() }
         })
     }

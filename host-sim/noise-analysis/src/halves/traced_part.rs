@@ -32,7 +32,6 @@ use allan_core::NoiseTerm;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use measurement::{ChannelId, PerChannel, SensorProfile};
-use std::sync::Arc;
 
 /// The data that a part of a recording is fitted from.
 pub(crate) struct PartData<'a> {
@@ -48,10 +47,6 @@ pub(crate) struct PartSamples<'a> {
     pub series: &'a PerChannel<Series>,
     /// Findings in the block means of each channel.
     pub biases: PerChannel<BiasByBlocks>,
-    /// Another part, which may have the same samples: what they show is then known.
-    pub known: Option<&'a TracedPart>,
-    /// True if two levels are looked for, which the model has as a Markov process.
-    pub seeks_levels: bool,
 }
 
 /// Findings in the block means of a channel.
@@ -82,7 +77,6 @@ pub(crate) struct ChannelTrace {
     pub telegraph: Option<TelegraphNoise>,
     /// Signals in the samples.
     pub signals: Vec<Signal>,
-    shown: Option<Arc<ShownBySamples>>,
     slowest: Option<CosineSpectrum>,
     /// The spectrum of the samples where their means alone are kept.
     spectrum: Option<Welch>,
@@ -214,7 +208,6 @@ impl ChannelTrace {
             noise: None,
             telegraph: None,
             signals: Vec::new(),
-            shown: None,
             slowest: None,
             spectrum: None,
         }
@@ -232,17 +225,12 @@ impl ChannelTrace {
         let rest = UniformSeries::from_series(compensated.as_ref().unwrap_or(own));
         let rest = rest.with_rounding(covariates.rounding().clone());
         let samples_per_mean = samples.record.samples_per_mean;
-        let known = samples.known.and_then(|part| part.channels[channel].shown.clone());
-        let shown =
-            known.filter(|known| known.is_of(own, compensated.as_ref(), rest.rounding())).unwrap_or_else(|| {
-                ShownBySamples::find(own, compensated.as_ref(), &rest, (profile, samples_per_mean)).into()
-            });
+        let shown = ShownBySamples::find(own, compensated.as_ref(), &rest, (profile, samples_per_mean));
         let faster = &samples.record.channels[channel].faster_lines;
         let (mut fit, lines) = fit_with_lines(covariates, &shown, profile, (samples_per_mean, faster));
         let correlation_times = || fit.correlation_times().collect::<Vec<f64>>();
-        let levels = || telegraph_noise(&rest, own.unit, &correlation_times());
-        let telegraph = if samples.seeks_levels { levels() } else { None };
-        let found = SpectrumProposals::new(shown.signals.clone(), rest.duration(), lines, fit.bands());
+        let telegraph = telegraph_noise(&rest, own.unit, &correlation_times());
+        let found = SpectrumProposals::new(shown.signals, rest.duration(), lines, fit.bands());
         let found = standing_in_spectrum(found);
         let share = SignalShare::new(found.periodic.as_ref(), found.track.as_ref());
         let noise = found.periodic.as_ref().map(|periodic| periodic.subtracted_from(&rest));
@@ -254,7 +242,7 @@ impl ChannelTrace {
         }
         let slowest = CosineSpectrum::new(noise.as_ref().unwrap_or(&rest));
         let spectrum = samples.record.spectrum_within(channel, own.span.clone());
-        Self { fit, lines, rest: Some(rest), noise, telegraph, signals, shown: Some(shown), slowest, spectrum }
+        Self { fit, lines, rest: Some(rest), noise, telegraph, signals, slowest, spectrum }
     }
 }
 

@@ -6,10 +6,10 @@
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
-use crate::detectors::knock_search::{self, LoudStretches, SearchedChannel};
+use crate::detectors::knock_search::{KnockSearch, LoudStretches, SearchedChannel};
 use crate::detectors::knocks::{Knock, slots_within};
 use crate::detectors::output_range::find_noise_below_count;
-use crate::detectors::spikes::{self, SpikeRule};
+use crate::detectors::spikes::SpikeRule;
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::effects::findings::Correction;
 use crate::effects::{Effect, NoisyInterval};
@@ -35,6 +35,8 @@ pub(crate) struct Preprocessing {
 }
 
 struct Shown {
+    /// The rules for knocks of the inertial channels.
+    search: Arc<KnockSearch>,
     /// Counts of the smallest step of each channel.
     counts_per_step: PerChannel<u32>,
     repeated: Vec<u64>,
@@ -46,10 +48,11 @@ struct ShownInChannel {
     /// Excluded sample periods, in ascending order.
     knocks: Vec<u64>,
     spikes: Vec<u64>,
+    spike_rule: Option<SpikeRule>,
     bias: ChannelBias,
 }
 
-#[derive(Default, PartialEq)]
+#[derive(Default, Clone, PartialEq)]
 struct ChannelBias {
     /// First sample period with an offset, and the offset in the channel's unit.
     offset: Option<(u64, f64)>,
@@ -61,21 +64,11 @@ struct ChannelBias {
 }
 
 impl Preprocessing {
-    /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels, and in the `first_half` alone.
-    pub(crate) fn detect(record: &CondensedRecord, first_half: Option<&CondensedRecord>) -> Self {
-        let measurement = record.means.as_ref();
-        let slots: Arc<[u64]> = measurement.slots.as_slice().into();
-        let by_first_half = || {
-            first_half.map(|half| {
-                let middle = measurement.middle();
-                // Repeated samples of the second half are dropped by either exclusion.
-                let repeated = record.repeated.iter().copied().filter(|slot| *slot >= middle);
-                let repeated = half.repeated.iter().copied().chain(repeated).collect();
-                Shown::by_first_half(record, half, &slots, repeated)
-            })
-        };
-        let by_whole = || Shown::by_whole(record, &slots);
-        let (by_first_half, (by_whole, effects)) = parallel::both(by_first_half, by_whole);
+    /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels; those of the `first_half` hold in the second too.
+    pub(crate) fn detect(record: &CondensedRecord, first_half: Option<&Self>) -> Self {
+        let slots: Arc<[u64]> = record.means.slots.as_slice().into();
+        let by_first_half = || first_half.map(|half| half.by_whole.in_second_half(record, &slots));
+        let (by_first_half, (by_whole, effects)) = parallel::both(by_first_half, || Shown::find(record, &slots));
         Self { slots, by_whole, by_first_half, effects }
     }
 
@@ -163,12 +156,12 @@ impl Preprocessing {
         series.without(&self.excluded(channel, exclusion))
     }
 
-    pub(crate) fn has_ramp(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
-        self.bias(channel, exclusion).is_some_and(|bias| bias.has_ramp)
+    pub(crate) fn has_ramp(&self, channel: ChannelId) -> bool {
+        self.by_whole.channels[channel].bias.has_ramp
     }
 
-    pub(crate) fn sensitivities(&self, channel: ChannelId, exclusion: Exclusion) -> &[(ChannelId, BiasSensitivity)] {
-        self.bias(channel, exclusion).map_or(&[], |bias| &bias.sensitivities)
+    pub(crate) fn sensitivities(&self, channel: ChannelId) -> &[(ChannelId, BiasSensitivity)] {
+        &self.by_whole.channels[channel].bias.sensitivities
     }
 
     pub(crate) fn effects(&self, channel: ChannelId) -> &[Effect] {
@@ -190,12 +183,12 @@ fn all_measured(
 }
 
 impl Shown {
-    /// The findings in the whole record, and the effects of each channel.
-    fn by_whole(record: &CondensedRecord, slots: &Arc<[u64]>) -> (Self, PerChannel<Vec<Effect>>) {
+    /// The findings in a record, and the effects of each channel.
+    fn find(record: &CondensedRecord, slots: &Arc<[u64]>) -> (Self, PerChannel<Vec<Effect>>) {
         let measurement = record.means.as_ref();
         let counts_per_step = record.channels.map(|of| of.counts_per_step);
         let series = all_measured(measurement, slots, &counts_per_step);
-        let [loud] = loud_stretches(record, &record.repeated, [&series]);
+        let (search, loud) = loud_stretches(record, &series);
         let once = series.map(|of| of.clone().without(&record.repeated));
         // Covariates, without their own knocks.
         let quiet = without_knocks(&once, &loud);
@@ -206,52 +199,55 @@ impl Shown {
             }
             let LoudStretches { knocks, by_itself } = &loud[channel];
             let can_show_spikes = record.channels[channel].can_show_spikes;
-            let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], by_itself)).flatten();
+            let spike_rule = can_show_spikes.then(|| SpikeRule::fit(&quiet[channel])).flatten();
+            let spikes = spike_rule.as_ref().and_then(|rule| rule.detect(&quiet[channel], by_itself));
             let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
             let (bias, found) = bias_of(record, channel, (&once, &quiet), &forces, &excluded);
             let BiasChanges { step, ramp, responses, .. } = found;
             let changes = spikes.into_iter().chain(step).chain(ramp).map(|detection| detection.effect);
             let knocked = intervals(measurement, &loud, channel).into_iter().map(Effect::from);
             let effects = responses.iter().map(|of| of.effect.clone()).chain(knocked).chain(changes).collect();
-            (ShownInChannel { knocks: slots_within(&once[channel], knocks), spikes: excluded, bias }, effects)
+            let knocks = slots_within(&once[channel], knocks);
+            (ShownInChannel { knocks, spikes: excluded, spike_rule, bias }, effects)
         };
         let (channels, effects): (Vec<_>, Vec<_>) = per_channel(measurement.ids(), of_channel).into_iter().unzip();
-        let shown = Self { counts_per_step, repeated: record.repeated.clone(), channels: channels.into() };
+        let (search, repeated) = (search.into(), record.repeated.clone());
+        let shown = Self { search, counts_per_step, repeated, channels: channels.into() };
         (shown, effects.into())
     }
 
-    /// The findings in the `first_half`, with the knocks and spikes of both halves by its rules.
-    fn by_first_half(
-        record: &CondensedRecord,
-        first_half: &CondensedRecord,
-        slots: &Arc<[u64]>,
-        repeated: Vec<u64>,
-    ) -> Self {
+    /// These findings in the first half of a record, with the knocks and spikes of the second half by the same rules.
+    fn in_second_half(&self, record: &CondensedRecord, slots: &Arc<[u64]>) -> Self {
         let measurement = record.means.as_ref();
         let middle = measurement.middle();
-        let counts_per_step = first_half.channels.map(|of| of.counts_per_step);
-        let series = all_measured(measurement, slots, &counts_per_step);
-        let halves = [series.map(|of| of.before(middle)), series.map(|of| of.from(middle))];
-        let loud = loud_stretches(first_half, &repeated, halves.each_ref());
-        let once = halves.map(|half| half.map(|of| of.clone().without(&repeated)));
-        let [quiet, quiet_second] = [0, 1].map(|half| without_knocks(&once[half], &loud[half]));
-        let forces = forces(measurement, &quiet);
+        let second = all_measured(measurement, slots, &self.counts_per_step).map(|of| of.from(middle));
+        // Repeated samples of the second half are dropped by either exclusion.
+        let repeated: Vec<u64> = record.repeated.iter().copied().filter(|slot| *slot >= middle).collect();
+        let inertial: Vec<ChannelId> = measurement.inertial().collect();
+        let searched: Vec<Series> = inertial.iter().map(|&of| second[of].clone()).collect();
+        let loud = of_inertial(measurement, self.search.find(&searched, &repeated));
+        let once = second.map(|of| of.clone().without(&repeated));
+        let quiet = without_knocks(&once, &loud);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
                 return ShownInChannel::default();
             }
-            let rule = SpikeRule::fit(&quiet[channel]);
-            let spikes = |series: &Series, loud: &LoudStretches| {
-                rule.as_ref().map(|rule| rule.slots(series, &loud.by_itself)).unwrap_or_default()
-            };
-            let of_first = spikes(&quiet[channel], &loud[0][channel]);
-            let (bias, _) = bias_of(record, channel, (&once[0], &quiet), &forces, &of_first);
-            let knocks = [0, 1].map(|half| slots_within(&once[half][channel], &loud[half][channel].knocks)).concat();
-            let of_second = spikes(&quiet_second[channel], &loud[1][channel]);
-            ShownInChannel { knocks, spikes: [of_first, of_second].concat(), bias }
+            let ShownInChannel { knocks, spikes, spike_rule, bias } = &self.channels[channel];
+            let LoudStretches { knocks: of_second, by_itself } = &loud[channel];
+            let later = spike_rule.as_ref().map(|rule| rule.slots(&quiet[channel], by_itself)).unwrap_or_default();
+            ShownInChannel {
+                knocks: [&knocks[..], &slots_within(&once[channel], of_second)].concat(),
+                spikes: [&spikes[..], &later].concat(),
+                spike_rule: None,
+                bias: bias.clone(),
+            }
         };
-        let channels = per_channel(measurement.ids(), of_channel);
-        Self { counts_per_step, repeated, channels }
+        Self {
+            search: Arc::clone(&self.search),
+            counts_per_step: self.counts_per_step.clone(),
+            channels: per_channel(measurement.ids(), of_channel),
+            repeated: [&self.repeated[..], &repeated].concat(),
+        }
     }
 }
 
@@ -326,27 +322,24 @@ fn intervals(measurement: &Measurement, loud: &PerChannel<LoudStretches>, channe
     loud[channel].knocks.iter().map(interval).collect()
 }
 
-/// Loud stretches of each of the `parts` of a record, by the rules of the first part; none in other channels.
-fn loud_stretches<const PARTS: usize>(
-    record: &CondensedRecord,
-    repeated: &[u64],
-    parts: [&PerChannel<Series>; PARTS],
-) -> [PerChannel<LoudStretches>; PARTS] {
+/// The rules for knocks in the inertial channels of a record, and the loud stretches of each channel.
+fn loud_stretches(record: &CondensedRecord, series: &PerChannel<Series>) -> (KnockSearch, PerChannel<LoudStretches>) {
     let measurement = record.means.as_ref();
-    let inertial: Vec<ChannelId> = measurement.inertial().collect();
-    let searched = |&of: &ChannelId| SearchedChannel {
-        fitted: &parts[0][of],
-        parts: parts.iter().map(|part| &part[of]).collect(),
+    let searched = |of: ChannelId| SearchedChannel {
+        series: series[of].clone(),
         can_show_spikes: record.channels[of].can_show_spikes,
     };
-    let searched: Vec<SearchedChannel> = inertial.iter().map(searched).collect();
-    let found = knock_search::find(&searched, repeated, measurement.profile.dithered_avar_counts2);
-    let mut found = found.into_iter();
-    parts.map(|part| {
-        let mut loud: PerChannel<LoudStretches> = part.map(|_| LoudStretches::default());
-        inertial.iter().zip(found.next().unwrap_or_default()).for_each(|(&of, found)| loud[of] = found);
-        loud
-    })
+    let searched: Vec<SearchedChannel> = measurement.inertial().map(searched).collect();
+    let dithered_avar_counts2 = measurement.profile.dithered_avar_counts2;
+    let (search, found) = KnockSearch::fit(&searched, &record.repeated, dithered_avar_counts2);
+    (search, of_inertial(measurement, found))
+}
+
+/// The loud stretches of every channel: those `found` in the inertial ones, none in the others.
+fn of_inertial(measurement: &Measurement, found: Vec<LoudStretches>) -> PerChannel<LoudStretches> {
+    let mut loud: PerChannel<LoudStretches> = measurement.ids().map(|_| LoudStretches::default()).collect();
+    measurement.inertial().zip(found).for_each(|(of, found)| loud[of] = found);
+    loud
 }
 
 /// The forces that the gyroscopes may follow.

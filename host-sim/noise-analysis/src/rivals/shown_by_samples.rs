@@ -1,7 +1,4 @@
 //! Evidence in the samples of a channel, independent of its curve: the lines of their spectrum, and signals.
-//!
-//! The first half of a record is traced twice, as a part of it and as a record of its own. Most of its channels have the same samples in
-//! both, and what these show is looked for once.
 
 use crate::rivals::signals::SampleSignals;
 use crate::samples::rounding::Rounding;
@@ -15,7 +12,6 @@ use measurement::SensorProfile;
 pub(crate) struct ShownBySamples {
     /// The samples, and the same less the covariates, if the channel depends on any.
     pub series: Series,
-    rest: Option<Series>,
     rounding: Rounding,
     rate_error: f64,
     /// Values of the sensor for each of the samples.
@@ -42,16 +38,10 @@ impl ShownBySamples {
             lines_of_rest: rest.map(lines),
             signals: SampleSignals::find(uniform),
             series: series.clone(),
-            rest: rest.cloned(),
             rounding: uniform.rounding().clone(),
             rate_error,
             read_every,
         }
-    }
-
-    /// True if it was found in the same samples of the same sensor.
-    pub(crate) fn is_of(&self, series: &Series, rest: Option<&Series>, rounding: &Rounding) -> bool {
-        self.series == *series && self.rest.as_ref() == rest && self.rounding == *rounding
     }
 
     /// Lines of the spectrum of the samples over the background of a model.

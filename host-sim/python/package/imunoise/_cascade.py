@@ -31,9 +31,9 @@ class Cascade:
     Integers are counts. They are summed exactly: neither the length of the record nor an offset costs a digit.
 
     Floats are rounded to the counts of a grid, `origin + count·lsb`. Without `lsb` the first array of floats decides:
-    the origin is its first value, and the LSB is the largest power of two below 1/65536 of the root mean square of
-    `(x[i+1] − x[i])/√2`, so that rounding adds 2·10⁻¹¹ of the variance of white noise. A later value more than 2³¹ steps
-    from the origin raises `OverflowError`. With `lsb`, integers are values on that grid too.
+    the origin is its first value, and the LSB is the largest power of two below 1/65536 (`float32`: 1/256) of the root
+    mean square of `(x[i+1] − x[i])/√2`, so that rounding adds 2·10⁻¹¹ (1.3·10⁻⁶) of the variance of white noise. A later
+    value more than 2³¹ steps from the origin raises `OverflowError`. With `lsb`, integers are values on that grid too.
 
     Args:
         overlap: differences per averaging time: 1 (none), 2, 4, 8 or 16. With 8, at least 98 % of the degrees of freedom
