@@ -125,7 +125,7 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
             let (lost, [a, b, c, d, e, f, t, v]) = (losses.lost, losses.refused);
             text!("missing: {lost} lost; refused gyros {a} {b} {c}, accelerometers {d} {e} {f}, temp {t}, supply {v}")
         }
-        4 => text!("start {}: {:?}, {} channels restored", boot.starts, boot.cause, boot.restored_channels),
+        4 => text!("start {} {}, {} channels restored", boot.starts, boot.cause.text(), boot.restored_channels),
         5 => match boot.clock {
             ClockSource::Crystal => text!("clock: crystal"),
             ClockSource::Internal => text!("clock: internal oscillator, the crystal did not start"),

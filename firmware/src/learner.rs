@@ -227,5 +227,3 @@ impl Learner {
         self.models[index] = fit.model();
     }
 }
-
-const _: () = assert!(CHANNELS.len() >= INERTIAL);

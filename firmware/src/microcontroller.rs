@@ -1,5 +1,5 @@
-//! Code shared by the images of all boards; a board implements [`BoardSupport`] and names its interrupts in
-//! [`observatory!`](crate::observatory).
+//! Code shared by the images of all boards; [`observatory!`](crate::observatory) makes an image of a [`Microcontroller`], of the function that
+//! starts the board, and of the names of its interrupts.
 
 pub mod context;
 pub mod image;
@@ -65,12 +65,9 @@ impl ServedPort for Infallible {
     }
 }
 
-/// A board: its microcontroller, the pins to which parts are connected, and its start.
-pub trait BoardSupport: Sized {
-    /// The peripherals of the microcontroller.
-    type Device;
-    /// Clock, watchdog and restart.
-    type Microcontroller: Microcontroller;
+/// A microcontroller with the pins to which a board connects the sensor and the ports: their types, watchdog and restart.
+/// The application knows [`Board`](crate::Board) alone, which hosts implement too.
+pub trait Microcontroller: Watchdog {
     /// The pin at DIO1 of the sensor.
     type DataReady: DataReadyPin;
     /// SPI of the sensor.
@@ -79,48 +76,12 @@ pub trait BoardSupport: Sized {
     type Select: OutputPin<Error = Infallible>;
     /// The serial port to the host on pins.
     type Uart: ServedPort;
-
-    /// Starts clocks, watchdog and pins.
-    fn start(device: Self::Device, queues: UartQueues) -> BoardParts<Self>;
-}
-
-/// The bus of a board's sensor.
-pub type BusOf<B> = SensorSpi<<B as BoardSupport>::Spi, <B as BoardSupport>::Select>;
-/// The serial port to the host on USB of a board.
-pub type UsbOf<B> = <<B as BoardSupport>::Microcontroller as Microcontroller>::Usb;
-/// An output of a board.
-pub type OutputOf<B> = <<B as BoardSupport>::Microcontroller as Microcontroller>::Output;
-
-/// The parts of a board after its start.
-pub struct BoardParts<B: BoardSupport> {
-    /// Reason for which the microcontroller started.
-    pub cause: BootCause,
-    /// The source of the clocks.
-    pub clock: ClockSource,
-    /// Clock of the processor in Hz.
-    pub core_hz: u32,
-    /// The data-ready pin.
-    pub data_ready: B::DataReady,
-    /// The sensor's bus.
-    pub bus: BusOf<B>,
-    /// The serial port to the host on pins.
-    pub uart: B::Uart,
-    /// The serial port to the host on USB.
-    pub usb: Option<UsbParts<UsbOf<B>>>,
-    /// The LED.
-    pub led: OutputOf<B>,
-    /// The pin at RST of the sensor, if connected: high, and low for a reset.
-    pub reset_line: Option<OutputOf<B>>,
-}
-
-/// Clock, watchdog and restart of a microcontroller.
-pub trait Microcontroller: Watchdog {
-    /// The flash memory; the memory map leaves a part of it for the settings.
-    type Flash: FlashMemory;
-    /// An output pin of any number.
-    type Output: OutputPin;
     /// The serial port to the host on USB; [`Infallible`] if it has none.
     type Usb: ServedPort;
+    /// An output pin of any number.
+    type Output: OutputPin;
+    /// The flash memory; the memory map leaves a part of it for the settings.
+    type Flash: FlashMemory;
 
     /// Restarts processor and peripherals; the RAM keeps its content.
     fn restart() -> !;
@@ -133,6 +94,28 @@ pub trait Microcontroller: Watchdog {
     /// Feeds a watchdog that is shorter than a step of the main loop. To be called [`processor::WAKE_HZ`] times a
     /// second.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
+}
+
+/// The parts of a board after its start.
+pub struct BoardParts<M: Microcontroller> {
+    /// Reason for which the microcontroller started.
+    pub cause: BootCause,
+    /// The source of the clocks.
+    pub clock: ClockSource,
+    /// Clock of the processor in Hz.
+    pub core_hz: u32,
+    /// The data-ready pin.
+    pub data_ready: M::DataReady,
+    /// The sensor's bus.
+    pub bus: SensorSpi<M::Spi, M::Select>,
+    /// The serial port to the host on pins.
+    pub uart: M::Uart,
+    /// The serial port to the host on USB.
+    pub usb: Option<UsbParts<M::Usb>>,
+    /// The LED.
+    pub led: M::Output,
+    /// The pin at RST of the sensor, if connected: high, and low for a reset.
+    pub reset_line: Option<M::Output>,
 }
 
 /// The first cause whose flag is set.

@@ -1,4 +1,11 @@
 //! The path of samples: data-ready monitor, validation, statistics, counters.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | unusable burst | the transfer failed, or a fault refuses all inertial channels |
+//! | refused sample | arrived and not used, in one channel or in all: a fault, or a gross error |
+//! | suspect sensor | may have been reset or disconnected; its samples are not used before a probe |
+//! | spurious edge | of data ready, at no multiple of the sample period |
 
 use crate::acquisition::{DataReadyMonitor, TimedBurst};
 use crate::channels::ChannelSet;

@@ -49,8 +49,8 @@ pub struct SensorIdentity {
     pub test: Option<TestOutcome>,
 }
 
-/// Outcome of a self-test, `None` if it did not end. None makes samples unusable, since motion fails it too (data sheet
-/// Rev. B, page 15).
+/// Outcome of a self-test, `None` if it did not end. Samples are used after each outcome, since motion fails it too (data
+/// sheet Rev. B, page 15).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TestOutcome(Option<SelfTest>);
 

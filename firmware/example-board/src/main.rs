@@ -4,9 +4,8 @@
 #![no_std]
 #![no_main]
 
-use firmware::microcontroller::rp2040::start::Rp2040;
-use firmware::microcontroller::rp2040::wires;
-use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
+use firmware::microcontroller::rp2040::wires::{self, WiredRp2040};
+use firmware::microcontroller::{BoardParts, UartQueues};
 use rp2040_hal::pac;
 
 /// The second stage of the boot loader, for the Pico's flash.
@@ -15,24 +14,13 @@ use rp2040_hal::pac;
 #[used]
 static BOOT2_FIRMWARE: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
 
-/// The board.
-pub struct ExampleBoard;
-
-impl BoardSupport for ExampleBoard {
-    type Device = pac::Peripherals;
-    type Microcontroller = Rp2040;
-    type DataReady = wires::DataReady;
-    type Spi = wires::SensorSpi0;
-    type Select = wires::Select;
-    type Uart = wires::Uart;
-
-    fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        wires::start(device, queues, true, true)
-    }
+fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<WiredRp2040> {
+    wires::start(device, queues, true, true)
 }
 
 firmware::observatory! {
-    board: ExampleBoard;
+    microcontroller: WiredRp2040;
+    start: start;
     device: rp2040_hal::pac;
     data_ready: IO_IRQ_BANK0;
     end_of_burst: DMA_IRQ_0;

@@ -143,6 +143,21 @@ pub enum BootCause {
     Watchdog,
 }
 
+impl BootCause {
+    /// The cause in words, after "started".
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Unknown => "for no known reason",
+            Self::PowerOn => "by power-on",
+            Self::BrownOut => "by a brown-out",
+            Self::Pin => "by the reset pin",
+            Self::Software => "by the program",
+            Self::Watchdog => "by the watchdog",
+        }
+    }
+}
+
 /// Exact sums of one channel and the baseline model fitted to them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelMessage {

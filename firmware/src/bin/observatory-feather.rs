@@ -15,54 +15,44 @@
 #![no_std]
 #![no_main]
 
-use firmware::microcontroller::stm32f4::bus::Spi1;
 use firmware::microcontroller::stm32f4::port::UsartPort;
 use firmware::microcontroller::stm32f4::start::Stm32f4;
 #[cfg(feature = "feather-usb")]
 use firmware::microcontroller::stm32f4::usb::usb_port;
-use firmware::microcontroller::stm32f4::wires::SensorWires;
-use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
-use stm32f4xx_hal::gpio::{Input, Output, PA4, PC4};
+use firmware::microcontroller::stm32f4::wires::{SensorWires, WiredStm32f4};
+use firmware::microcontroller::{BoardParts, UartQueues};
 use stm32f4xx_hal::pac::{self, USART3};
 use stm32f4xx_hal::prelude::*;
 
 const CRYSTAL_HZ: u32 = 12_000_000;
 
 /// The board.
-pub struct Feather;
+type Feather = WiredStm32f4<'C', 4, USART3>;
 
-impl BoardSupport for Feather {
-    type Device = pac::Peripherals;
-    type Microcontroller = Stm32f4;
-    type DataReady = PC4<Input>;
-    type Spi = Spi1;
-    type Select = PA4<Output>;
-    type Uart = UsartPort<USART3>;
-
-    fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
-        let rcc = &mut started.rcc;
-        let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
-        let uart = UsartPort::new(device.USART3, (b.pb10, b.pb11.into_pull_up_input()), queues, rcc);
-        #[cfg(not(feature = "feather-usb"))]
-        let usb = None;
-        #[cfg(feature = "feather-usb")]
-        let usb = {
-            let registers = (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK);
-            usb_port(registers, (a.pa11, a.pa12), &rcc.clocks)
-        };
-        let sensor = SensorWires {
-            spi: (device.SPI1, device.DMA2),
-            pins: (a.pa4, a.pa5, a.pa6, a.pa7),
-            data_ready: c.pc4,
-            edges: (device.EXTI, device.SYSCFG),
-        };
-        started.board(sensor, uart, usb, c.pc1.into_push_pull_output().erase())
-    }
+fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Feather> {
+    let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
+    let rcc = &mut started.rcc;
+    let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
+    let uart = UsartPort::new(device.USART3, (b.pb10, b.pb11.into_pull_up_input()), queues, rcc);
+    #[cfg(not(feature = "feather-usb"))]
+    let usb = None;
+    #[cfg(feature = "feather-usb")]
+    let usb = {
+        let registers = (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK);
+        usb_port(registers, (a.pa11, a.pa12), &rcc.clocks)
+    };
+    let sensor = SensorWires {
+        spi: (device.SPI1, device.DMA2),
+        pins: (a.pa4, a.pa5, a.pa6, a.pa7),
+        data_ready: c.pc4,
+        edges: (device.EXTI, device.SYSCFG),
+    };
+    started.board(sensor, uart, usb, c.pc1.into_push_pull_output().erase())
 }
 
 firmware::observatory! {
-    board: Feather;
+    microcontroller: Feather;
+    start: start;
     device: stm32f4xx_hal::pac;
     data_ready: EXTI4;
     end_of_burst: DMA2_STREAM0;

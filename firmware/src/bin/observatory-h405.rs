@@ -12,45 +12,35 @@
 #![no_std]
 #![no_main]
 
-use firmware::microcontroller::stm32f4::bus::Spi1;
 use firmware::microcontroller::stm32f4::port::UsartPort;
 use firmware::microcontroller::stm32f4::start::Stm32f4;
-use firmware::microcontroller::stm32f4::wires::SensorWires;
-use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
-use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0};
+use firmware::microcontroller::stm32f4::wires::{SensorWires, WiredStm32f4};
+use firmware::microcontroller::{BoardParts, UartQueues};
 use stm32f4xx_hal::pac::{self, USART2};
 use stm32f4xx_hal::prelude::*;
 
 const CRYSTAL_HZ: u32 = 8_000_000;
 
 /// The board.
-pub struct H405;
+type H405 = WiredStm32f4<'B', 0, USART2>;
 
-impl BoardSupport for H405 {
-    type Device = pac::Peripherals;
-    type Microcontroller = Stm32f4;
-    type DataReady = PB0<Input>;
-    type Spi = Spi1;
-    type Select = PA4<Output>;
-    type Uart = UsartPort<USART2>;
-
-    fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
-        let rcc = &mut started.rcc;
-        let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
-        let uart = UsartPort::new(device.USART2, (a.pa2, a.pa3.into_pull_up_input()), queues, rcc);
-        let sensor = SensorWires {
-            spi: (device.SPI1, device.DMA2),
-            pins: (a.pa4, a.pa5, a.pa6, a.pa7),
-            data_ready: b.pb0,
-            edges: (device.EXTI, device.SYSCFG),
-        };
-        started.board(sensor, uart, None, c.pc12.into_push_pull_output().erase())
-    }
+fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<H405> {
+    let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
+    let rcc = &mut started.rcc;
+    let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
+    let uart = UsartPort::new(device.USART2, (a.pa2, a.pa3.into_pull_up_input()), queues, rcc);
+    let sensor = SensorWires {
+        spi: (device.SPI1, device.DMA2),
+        pins: (a.pa4, a.pa5, a.pa6, a.pa7),
+        data_ready: b.pb0,
+        edges: (device.EXTI, device.SYSCFG),
+    };
+    started.board(sensor, uart, None, c.pc12.into_push_pull_output().erase())
 }
 
 firmware::observatory! {
-    board: H405;
+    microcontroller: H405;
+    start: start;
     device: stm32f4xx_hal::pac;
     data_ready: EXTI0;
     end_of_burst: DMA2_STREAM0;

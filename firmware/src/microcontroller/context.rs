@@ -1,12 +1,12 @@
 //! The [`Board`] of the main loop, over the resources that it shares with the interrupts.
 
 use super::processor::{ESTIMATOR_CYCLES, LOST_BYTES, SAMPLING_CYCLES, stack};
-use super::sensor_spi::BurstEnd;
+use super::sensor_spi::{BurstEnd, SensorSpi};
 use super::settings_flash::SettingsFlash;
-use super::{BoardSupport, BusOf, DataReadyPin as _, Microcontroller, OutputOf};
+use super::{DataReadyPin as _, Microcontroller};
 use crate::acquisition::{EdgeAction, Sampler, SamplingActivity, TimedBurst};
 use crate::board::{Board, BrownOutLevel, BusTiming, FrameTimes, Uptime};
-use crate::bus_frame::{BusFault, MicrosecondCounter as _};
+use crate::bus_frame::BusFault;
 use crate::receive::{HostPort, ReceivedBytes};
 use crate::sample_intake::Estimators;
 use crate::settings_store::{SettingsStore, StoreError};
@@ -28,22 +28,21 @@ const RESET_US: u32 = 100;
 const BURST_US: u32 = 5_000;
 
 /// The resources shared with the two interrupts of sampling.
-pub struct SharedSampling<B: BoardSupport> {
+pub struct SharedSampling<M: Microcontroller> {
     uptime: Uptime,
-    bus: BusOf<B>,
+    bus: SensorSpi<M::Spi, M::Select>,
     sampler: Sampler<'static>,
-    line: B::DataReady,
+    line: M::DataReady,
 }
 
-impl<B: BoardSupport> SharedSampling<B> {
+impl<M: Microcontroller> SharedSampling<M> {
     /// Sampling that queues its bursts in `queue`.
-    pub fn new(bus: BusOf<B>, line: B::DataReady, queue: Producer<'static, TimedBurst>) -> Self {
-        let uptime = Uptime::new(B::Microcontroller::counter());
-        Self { uptime, bus, sampler: Sampler::new(queue), line }
+    pub fn new(bus: SensorSpi<M::Spi, M::Select>, line: M::DataReady, queue: Producer<'static, TimedBurst>) -> Self {
+        Self { uptime: Uptime::new(M::counter()), bus, sampler: Sampler::new(queue), line }
     }
 
     fn now_us(&mut self) -> u64 {
-        self.uptime.at(B::Microcontroller::counter())
+        self.uptime.at(M::counter())
     }
 
     /// Handles a data-ready edge: starts the transfer of a burst by DMA.
@@ -76,23 +75,23 @@ pub struct SharedEstimation {
 }
 
 /// A [`Board`] made of what it shares with its interrupts; access disables only those.
-pub struct BoardContext<'r, B: BoardSupport, S, E> {
+pub struct BoardContext<'r, M: Microcontroller, S, E> {
     sampling: S,
     estimation: E,
-    reset_line: &'r mut Option<OutputOf<B>>,
+    reset_line: &'r mut Option<M::Output>,
     received: &'r mut ReceivedBytes<'static>,
     request_transmission: fn(),
     abandon_burst: fn(),
     asleep_us: u64,
-    watchdog: Feeder<B::Microcontroller>,
+    watchdog: Feeder<M>,
 }
 
-impl<'r, B: BoardSupport, S, E> BoardContext<'r, B, S, E> {
+impl<'r, M: Microcontroller, S, E> BoardContext<'r, M, S, E> {
     /// `received` has the bytes from the serial ports. `request_transmission` requests their interrupts. `abandon_burst` requests the
     /// interrupt of the end of a burst, which fails if it is still being transferred.
     pub fn new(
         (sampling, estimation): (S, E),
-        reset_line: &'r mut Option<OutputOf<B>>,
+        reset_line: &'r mut Option<M::Output>,
         received: &'r mut ReceivedBytes<'static>,
         request_transmission: fn(),
         abandon_burst: fn(),
@@ -101,17 +100,13 @@ impl<'r, B: BoardSupport, S, E> BoardContext<'r, B, S, E> {
         Self { sampling, estimation, reset_line, received, request_transmission, abandon_burst, asleep_us: 0, watchdog }
     }
 
-    fn counter() -> u32 {
-        B::Microcontroller::counter()
-    }
-
-    fn store() -> Option<SettingsStore<SettingsFlash<<B::Microcontroller as Microcontroller>::Flash>>> {
+    fn store() -> Option<SettingsStore<SettingsFlash<M::Flash>>> {
         SettingsFlash::store()
     }
 }
 
-impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstimation>> Board
-    for BoardContext<'_, B, S, E>
+impl<M: Microcontroller, S: Mutex<T = SharedSampling<M>>, E: Mutex<T = SharedEstimation>> Board
+    for BoardContext<'_, M, S, E>
 {
     fn now_us(&mut self) -> u64 {
         self.sampling.lock(|sampling| sampling.now_us())
@@ -120,9 +115,9 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
     /// Returns before the waking interrupt is served.
     fn sleep(&mut self) {
         cortex_m::interrupt::free(|_| {
-            let fell_asleep = Self::counter();
+            let fell_asleep = M::counter();
             cortex_m::asm::wfi();
-            self.asleep_us += u64::from(Self::counter().wrapping_sub(fell_asleep));
+            self.asleep_us += u64::from(M::counter().wrapping_sub(fell_asleep));
         });
     }
 
@@ -154,9 +149,9 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
     }
 
     fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
-        let start = Self::counter();
+        let start = M::counter();
         let mut edge = |active: bool| loop {
-            let now = Self::counter();
+            let now = M::counter();
             if self.sampling.lock(|sampling| sampling.line.is_active()) == active {
                 return Some(now);
             }
@@ -175,9 +170,9 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
         if enabled {
             self.sampling.lock(|sampling| sampling.line.set_masked(false));
         } else {
-            let start = Self::counter();
+            let start = M::counter();
             while self.sampling.lock(|sampling| sampling.sampler.is_reading()) {
-                if Self::counter().wrapping_sub(start) > BURST_US {
+                if M::counter().wrapping_sub(start) > BURST_US {
                     (self.abandon_burst)();
                 }
             }
@@ -222,11 +217,11 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
     }
 
     fn restart(&mut self) {
-        B::Microcontroller::restart()
+        M::restart()
     }
 
     fn program_brown_out(&mut self) -> BrownOutLevel {
-        B::Microcontroller::program_brown_out()
+        M::program_brown_out()
     }
 
     fn keeps_record(&mut self) -> bool {
@@ -242,7 +237,7 @@ impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstima
     }
 
     fn start_boot_loader(&mut self) -> bool {
-        B::Microcontroller::start_boot_loader()
+        M::start_boot_loader()
     }
 }
 
@@ -253,7 +248,7 @@ impl<S> ErrorType for LockedBus<'_, S> {
     type Error = BusFault;
 }
 
-impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>> SpiDevice<u8> for LockedBus<'_, S> {
+impl<M: Microcontroller, S: Mutex<T = SharedSampling<M>>> SpiDevice<u8> for LockedBus<'_, S> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
         self.0.lock(|sampling| sampling.bus.transaction(operations))
     }

@@ -21,16 +21,8 @@ pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
         retained.clear();
     }
     let boot = Boot { cause, crash_record: CRASH_RECORD.take(), clock, ..Boot::default() };
-    let cause = match cause {
-        BootCause::Unknown => "of unknown cause",
-        BootCause::PowerOn => "by power-on",
-        BootCause::BrownOut => "by brown-out",
-        BootCause::Pin => "by the reset pin",
-        BootCause::Software => "by the program",
-        BootCause::Watchdog => "by the watchdog",
-    };
     let (crystal, record) = (clock == ClockSource::Crystal, boot.crash_record.as_str());
-    defmt::info!("start {=str}, crystal {=bool}, crash record: {=str}", cause, crystal, record);
+    defmt::info!("start {=str}, crystal {=bool}, crash record: {=str}", cause.text(), crystal, record);
     (boot, retained)
 }
 
@@ -57,9 +49,10 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
 
 /// Defines the image of a board: start-up, interrupts and main loop.
 ///
-/// `board` implements [`BoardSupport`](crate::microcontroller::BoardSupport) for the peripherals of `device`.
-/// Interrupts: data ready, end of a burst, UART, USB if any, and an unused one for the estimators. The package needs
-/// the crates `rtic`, `heapless` and `cortex-m-rt`, and their features of this one.
+/// `microcontroller` is a [`Microcontroller`](crate::microcontroller::Microcontroller), and `start` the function that starts clocks, watchdog and
+/// pins: from the peripherals of `device` and [`UartQueues`](crate::microcontroller::UartQueues) it makes
+/// [`BoardParts`](crate::microcontroller::BoardParts). Interrupts: data ready, end of a burst, UART, USB if any, and an unused one for the
+/// estimators. The package needs the crates `rtic`, `heapless` and `cortex-m-rt`, and their features of this one.
 ///
 /// | priority | interrupt |
 /// |---|---|
@@ -71,7 +64,8 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
 #[macro_export]
 macro_rules! observatory {
     (
-        board: $board:ty;
+        microcontroller: $microcontroller:ty;
+        start: $start:path;
         device: $($device:ident)::+;
         data_ready: $edge:ident;
         end_of_burst: $burst_end:ident;
@@ -89,30 +83,29 @@ macro_rules! observatory {
             use $crate::microcontroller::processor::{
                 Blinker, ESTIMATOR_CYCLES, SAMPLING_CYCLES, count_lost_bytes, measure, start_systick,
             };
-            use $crate::microcontroller::{
-                BoardParts, BoardSupport, Microcontroller, OutputOf, UartQueues, UsbOf,
-            };
+            use $crate::microcontroller::{BoardParts, Microcontroller, UartQueues};
             use $crate::{
                 BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, MicrosecondCounter as _, ReceiveBuffer,
                 ReceivedBytes, Receiver, ServedPort as _, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue,
                 WatchdogExtension, estimate, run,
             };
 
-            type Mcu = <$board as BoardSupport>::Microcontroller;
+            type Mcu = $microcontroller;
+            type Output = <Mcu as Microcontroller>::Output;
 
             #[shared]
             struct Shared {
-                sampling: SharedSampling<$board>,
+                sampling: SharedSampling<Mcu>,
                 estimation: SharedEstimation,
             }
 
             #[local]
             struct Local {
                 bursts: Consumer<'static, TimedBurst>,
-                uart: <$board as BoardSupport>::Uart,
-                usb: Option<UsbOf<$board>>,
-                reset_line: Option<OutputOf<$board>>,
-                blinker: Blinker<OutputOf<$board>>,
+                uart: <Mcu as Microcontroller>::Uart,
+                usb: Option<<Mcu as Microcontroller>::Usb>,
+                reset_line: Option<Output>,
+                blinker: Blinker<Output>,
                 received: ReceivedBytes<'static>,
                 start: Option<Start>,
             }
@@ -129,7 +122,7 @@ macro_rules! observatory {
                 let (receive, received) = context.local.receive_buffer.split();
                 let (to_estimators, bursts) = context.local.burst_queue.split();
                 let BoardParts { cause, clock, core_hz, data_ready, bus, uart, usb, led, reset_line } =
-                    <$board>::start(context.device, UartQueues { transmit, receive: Receiver::new(receive) });
+                    $start(context.device, UartQueues { transmit, receive: Receiver::new(receive) });
                 let (usb, usb_queues) = usb.unzip();
                 let (to_usb, from_usb) = usb_queues.unzip();
                 start_systick(context.core.SYST, core_hz);
@@ -155,7 +148,7 @@ macro_rules! observatory {
                 let idle::SharedResources { sampling, estimation, .. } = context.shared;
                 let (shared, abandon_burst) = ((sampling, estimation), || rtic::pend(Interrupt::$burst_end));
                 let board =
-                    BoardContext::<$board, _, _>::new(shared, reset_line, received, request_transmission, abandon_burst);
+                    BoardContext::<Mcu, _, _>::new(shared, reset_line, received, request_transmission, abandon_burst);
                 run(board, start.take().expect("the main loop starts once"))
             }
 
@@ -204,7 +197,7 @@ macro_rules! observatory {
         #[panic_handler]
         fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
             $crate::microcontroller::image::record_panic(info);
-            <<$board as $crate::microcontroller::BoardSupport>::Microcontroller as $crate::microcontroller::Microcontroller>::restart()
+            <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
 
         /// Passes on the exception frame; after a stack overflow it resets the stack pointer and passes none.
@@ -228,7 +221,7 @@ macro_rules! observatory {
 
         extern "C" fn faulted(frame: Option<&cortex_m_rt::ExceptionFrame>) -> ! {
             $crate::microcontroller::image::record_fault(frame);
-            <<$board as $crate::microcontroller::BoardSupport>::Microcontroller as $crate::microcontroller::Microcontroller>::restart()
+            <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
     };
 }

@@ -2,8 +2,8 @@
 
 use adis16405_driver::{Channel, GyroRange, OutputWord};
 use link::{
-    BootCause, ChannelMessage, ClockSource, DecoderCounters, Health, Hello, LearnedMessage, Message, RawBurst,
-    RawMessage, Received, ReportedAddedTerm, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedTerm,
+    ChannelMessage, ClockSource, DecoderCounters, Health, Hello, LearnedMessage, Message, RawBurst, RawMessage,
+    Received, ReportedAddedTerm, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedTerm,
     ValidationMessage,
 };
 use std::collections::BTreeMap;
@@ -93,18 +93,11 @@ fn hello(report: &Hello) -> Vec<String> {
     let (major, minor, patch) = report.firmware;
     let measured = report.measured_rate_hz.map_or_else(|| "not yet".to_owned(), |hz| format!("{hz:.4} Hz"));
     let epoch = if report.epoch_s == 0 { "without end".to_owned() } else { format!("of {} s", report.epoch_s) };
-    let cause = match report.boot.cause {
-        BootCause::Unknown => "for no known reason",
-        BootCause::PowerOn => "after power-on",
-        BootCause::BrownOut => "after a brown-out",
-        BootCause::Pin => "by the reset pin",
-        BootCause::Software => "by itself",
-        BootCause::Watchdog => "by the watchdog",
-    };
     let mut lines = vec![
         format!(
-            "-- firmware {major}.{minor}.{patch}, up {:.1} s, started {cause} (start {}, {} channels restored)",
+            "-- firmware {major}.{minor}.{patch}, up {:.1} s, started {} (start {}, {} channels restored)",
             report.uptime_us as f64 * 1e-6,
+            report.boot.cause.text(),
             report.boot.starts,
             report.boot.restored_channels
         ),

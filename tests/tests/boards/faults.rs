@@ -202,7 +202,7 @@ fn a_restart_keeps_what_its_cause_allows() {
     let [pin, fault, afresh] = answers[..] else { panic!("three answers: {answers:?}") };
     answers.iter().for_each(|lines| assert_sampled_since_the_start(lines));
 
-    assert_lines(pin, &["start 2: Pin, 8 channels restored", "length 3600 s"]);
+    assert_lines(pin, &["start 2 by the reset pin, 8 channels restored", "length 3600 s"]);
     // The statistics are those of the first stretch up to its last checkpoint, and those of the second stretch.
     let restarted = bursts.windows(2).position(|pair| pair[1].0 != pair[0].0 + 1).expect("a gap") + 1;
     let (before, after) = bursts.split_at(restarted);
@@ -221,9 +221,9 @@ fn a_restart_keeps_what_its_cause_allows() {
 
     assert_lines(
         fault,
-        &["start 3: Software, 8 channels restored", "crash record: hard fault at 0x080", "length 3600 s"],
+        &["start 3 by the program, 8 channels restored", "crash record: hard fault at 0x080", "length 3600 s"],
     );
-    assert_lines(afresh, &["start 1: BrownOut, 0 channels restored", "rate 204.80 Hz", "epoch 0, ", "length 0 s"]);
+    assert_lines(afresh, &["start 1 by a brown-out, 0 channels restored", "rate 204.80 Hz", "epoch 0, ", "length 0 s"]);
     assert!([pin, afresh].iter().all(|lines| lines.iter().all(|line| !line.contains("crash record"))));
 }
 
@@ -316,7 +316,7 @@ fn the_third_crash_in_a_row_is_followed_by_safe_mode() {
     assert_eq!(decoded.logs().iter().filter(|log| log.starts_with("safe mode")).count(), 1, "{:?}", decoded.logs());
     let answers = answers(&decoded.lines);
     let [safe, taking_commands] = answers[..] else { panic!("two answers: {answers:?}") };
-    assert_lines(safe, &["safe mode after three crashes", "start 4: Software, 0 channels restored", "length 0 s"]);
+    assert_lines(safe, &["safe mode after three crashes", "start 4 by the program, 0 channels restored", "length 0 s"]);
     assert_lines(safe, &["crash record: panic at device.rs:", ": memory is damaged: the sample period is 0"]);
     assert_lines(taking_commands, &["length 60 s"]);
     assert_sampled_since_the_start(taking_commands);

@@ -96,7 +96,7 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert!((0..9).contains(&(counter("used") + 16 - counter("bursts"))), "{:?}", decoded.lines);
     assert!(f64::from(counter("used")) > 5.0 * FAST_HZ);
     assert!(decoded.lines.iter().any(|line| line.contains("sensor sampled")), "{:?}", decoded.lines);
-    assert!(decoded.lines.iter().any(|line| line.starts_with("start 1: PowerOn")), "{:?}", decoded.lines);
+    assert!(decoded.lines.iter().any(|line| line.starts_with("start 1 by power-on")), "{:?}", decoded.lines);
     assert_eq!(part.violations(), []);
 }
 
@@ -281,10 +281,10 @@ fn a_failed_transfer_is_recovered_from() {
 fn a_restart_keeps_the_statistics_and_tells_its_cause() {
     // The panic comes before every channel has been checkpointed.
     let cases = [
-        (None, "start 2: Software, 8 channels restored", ""),
-        (Some((0.25, Fault::Period)), "start 2: Software, ", "panic at device.rs:"),
-        (Some((2.5, Fault::Exception)), "start 2: Software, 8 channels restored", "hard fault at 0x100"),
-        (Some((2.5, Fault::LockUp)), "start 2: Watchdog, 8 channels restored", ""),
+        (None, "start 2 by the program, 8 channels restored", ""),
+        (Some((0.25, Fault::Period)), "start 2 by the program, ", "panic at device.rs:"),
+        (Some((2.5, Fault::Exception)), "start 2 by the program, 8 channels restored", "hard fault at 0x100"),
+        (Some((2.5, Fault::LockUp)), "start 2 by the watchdog, 8 channels restored", ""),
     ];
     for (fault, start, record) in cases {
         let locked_s = if matches!(fault, Some((_, Fault::LockUp))) { 8.3 } else { 0.0 };

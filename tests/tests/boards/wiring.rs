@@ -210,7 +210,7 @@ fn the_h405_is_within_its_budget_and_gives_up_an_epoch_whose_fit_crashes() {
     let restarts = diagnostics.iter().filter(|diagnostic| diagnostic.starts_with("reset")).count();
     assert_eq!(restarts, 2, "{diagnostics:?}");
     for expected in [
-        "start 3: Software, 8 channels restored",
+        "start 3 by the program, 8 channels restored",
         "crash record: stack overflow",
         "sensor sampled",
         " samples, epoch 1,",

@@ -1,21 +1,23 @@
-//! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
+//! Start of an RP2040: cause, watchdog, brown-out level, crystal; and the data-ready input.
 
 use super::flash::Rp2040Flash;
 use super::usb::Rp2040UsbPort;
 use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
+use crate::microcontroller::sensor_spi::SpiPeripheral;
 use crate::microcontroller::{DataReadyPin, Microcontroller, first_cause};
+use crate::receive::ServedPort;
 use crate::watchdog::{Watchdog, WatchdogExtension};
+use core::convert::Infallible;
+use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
-use embedded_hal::digital::{InputPin, StatefulOutputPin};
+use embedded_hal::digital::{InputPin, OutputPin, StatefulOutputPin};
 use link::BootCause;
-use rp2040_hal::Timer;
-use rp2040_hal::clocks::{ClocksManager, init_clocks_and_plls};
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::{DynPinId, FunctionSioInput, FunctionSioOutput, Interrupt, Pin, PinId, PullDown};
-use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
+use rp2040_hal::pac::{TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
 
-const CRYSTAL_HZ: u32 = 12_000_000;
+pub(super) const CRYSTAL_HZ: u32 = 12_000_000;
 /// Time of the watchdog, fed by the main loop and SysTick; at most 8.388 s.
 const WATCHDOG_MS: u32 = 8_300;
 /// Time for which SysTick feeds the watchdog after the main loop, s; the longest step, a channel's fit, takes 2.5 s in
@@ -44,66 +46,48 @@ pub(super) fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> Boo
     first_cause(causes)
 }
 
-/// An RP2040 with running clock and watchdog.
-pub struct Rp2040;
+/// An RP2040 with running clock and watchdog: data-ready pin `D`, SPI `P` with chip select `S`, serial port `U`.
+pub struct Rp2040<D = (), P = (), S = (), U = ()>(PhantomData<(D, P, S, U)>);
 
-/// The peripherals from which the clocks are made.
-pub(super) struct ClockParts {
-    pub(super) crystal: XOSC,
-    pub(super) clocks: CLOCKS,
-    pub(super) plls: (PLL_SYS, PLL_USB),
-    pub(super) timer: TIMER,
+/// Starts the watchdog with its clock, and sets the brown-out level. Until the crystal runs, the ring oscillator clocks the
+/// watchdog: 5.7 s or more.
+pub(super) fn start_watchdog(watchdog: WATCHDOG, chip: &VREG_AND_CHIP_RESET) -> rp2040_hal::Watchdog {
+    let mut watchdog = rp2040_hal::Watchdog::new(watchdog);
+    watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
+    // The watchdog pauses while a debugger halts the processor.
+    watchdog.pause_on_debug(true);
+    watchdog.start(WATCHDOG_MS.millis());
+    chip.bod().modify(|_, w| {
+        // SAFETY: one of the 16 levels.
+        unsafe { w.vsel().bits(BROWN_OUT_LEVEL) }
+    });
+    watchdog
 }
 
-impl Rp2040 {
-    /// Starts the watchdog first, then clocks and microsecond counter. Without the crystal the LED blinks fast.
-    pub(super) fn start(
-        parts: ClockParts,
-        (watchdog, chip): (WATCHDOG, &VREG_AND_CHIP_RESET),
-        resets: &mut RESETS,
-        led: &mut impl StatefulOutputPin,
-    ) -> ClocksManager {
-        let mut watchdog = rp2040_hal::Watchdog::new(watchdog);
-        // Until the crystal runs, the ring oscillator clocks the watchdog: 5.7 s or more.
-        watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
-        // The watchdog pauses while a debugger halts the processor.
-        watchdog.pause_on_debug(true);
-        watchdog.start(WATCHDOG_MS.millis());
-        chip.bod().modify(|_, w| {
-            // SAFETY: one of the 16 levels.
-            unsafe { w.vsel().bits(BROWN_OUT_LEVEL) }
-        });
-        if !crystal_starts(&parts.crystal) {
-            for _ in 0..ALARM_BLINKS {
-                let _infallible = led.toggle();
-                cortex_m::asm::delay(ALARM_CYCLES);
-                watchdog.feed();
-            }
-            Self::restart();
-        }
-        let ClockParts { crystal, clocks, plls, timer } = parts;
-        let clocks = init_clocks_and_plls(CRYSTAL_HZ, crystal, clocks, plls.0, plls.1, resets, &mut watchdog);
-        let Ok(clocks) = clocks else { panic!("the clocks do not start") };
-        let _timer_runs_on = Timer::new(timer, resets, &clocks);
-        clocks
-    }
-}
-
-/// Waits for the crystal; the HAL would wait without a time limit.
-fn crystal_starts(crystal: &XOSC) -> bool {
+/// Waits for the crystal; the HAL would wait without a time limit. Without it the LED blinks fast, and the next attempt
+/// follows.
+pub(super) fn start_crystal(crystal: &XOSC, led: &mut impl StatefulOutputPin, watchdog: &rp2040_hal::Watchdog) {
     crystal.ctrl().write(|w| w.freq_range()._1_15mhz());
     crystal.ctrl().modify(|_, w| w.enable().enable());
-    (0..CRYSTAL_READINGS).any(|_| crystal.status().read().stable().bit_is_set())
+    if (0..CRYSTAL_READINGS).any(|_| crystal.status().read().stable().bit_is_set()) {
+        return;
+    }
+    for _ in 0..ALARM_BLINKS {
+        let _infallible = led.toggle();
+        cortex_m::asm::delay(ALARM_CYCLES);
+        watchdog.feed();
+    }
+    restart();
 }
 
-impl MicrosecondCounter for Rp2040 {
+impl<D, P, S, U> MicrosecondCounter for Rp2040<D, P, S, U> {
     fn counter() -> u32 {
         // SAFETY: a read without side effects.
         unsafe { (*TIMER::ptr()).timerawl().read().bits() }
     }
 }
 
-impl Watchdog for Rp2040 {
+impl<D, P, S, U> Watchdog for Rp2040<D, P, S, U> {
     fn feed() {
         reload_watchdog();
         FEEDINGS.store(FEEDINGS.load(Relaxed).wrapping_add(1), Relaxed);
@@ -116,10 +100,25 @@ fn reload_watchdog() {
     unsafe { (*WATCHDOG::ptr()).load().write(|w| w.bits(2 * 1000 * WATCHDOG_MS)) };
 }
 
-impl Microcontroller for Rp2040 {
-    type Flash = Rp2040Flash;
-    type Output = Pin<DynPinId, FunctionSioOutput, PullDown>;
+/// The watchdog restarts, since a core reset would not reset the peripherals.
+fn restart() -> ! {
+    // SAFETY: the write ends the program.
+    unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.trigger().set_bit()) };
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
+impl<D: DataReadyPin, P: SpiPeripheral, S: OutputPin<Error = Infallible>, U: ServedPort> Microcontroller
+    for Rp2040<D, P, S, U>
+{
+    type DataReady = D;
+    type Spi = P;
+    type Select = S;
+    type Uart = U;
     type Usb = Rp2040UsbPort;
+    type Output = Pin<DynPinId, FunctionSioOutput, PullDown>;
+    type Flash = Rp2040Flash;
 
     fn extend_watchdog(extension: &mut WatchdogExtension) {
         if extension.tick(FEEDINGS.load(Relaxed), EXTENSION_S * WAKE_HZ) {
@@ -127,13 +126,8 @@ impl Microcontroller for Rp2040 {
         }
     }
 
-    /// The watchdog restarts, since a core reset would not reset the peripherals.
     fn restart() -> ! {
-        // SAFETY: the write ends the program.
-        unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.trigger().set_bit()) };
-        loop {
-            cortex_m::asm::nop();
-        }
+        restart()
     }
 
     /// The boot loader offers a drive and an interface for picotool, without an activity LED.

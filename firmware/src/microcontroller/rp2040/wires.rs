@@ -16,17 +16,17 @@
 
 use super::bus::Spi0;
 use super::port::Uart0Port;
-use super::start::{ClockParts, Rp2040, boot_cause};
+use super::start::{CRYSTAL_HZ, Rp2040, boot_cause, start_crystal, start_watchdog};
 use super::usb::usb_port;
 use crate::microcontroller::sensor_spi::SensorSpi;
-use crate::microcontroller::{BoardParts, BoardSupport, UartQueues};
+use crate::microcontroller::{BoardParts, UartQueues};
 use crate::sensor::BURST_LIMIT_HZ;
 use link::ClockSource;
-use rp2040_hal::clocks::Clock;
+use rp2040_hal::clocks::{Clock, init_clocks_and_plls};
 use rp2040_hal::fugit::RateExtU32;
 use rp2040_hal::gpio::bank0::{Gpio0, Gpio1, Gpio16, Gpio17, Gpio18, Gpio19, Gpio20};
 use rp2040_hal::gpio::{self, FunctionSioInput, FunctionSioOutput, FunctionSpi, FunctionUart, PullDown, PullUp};
-use rp2040_hal::{Sio, Spi, pac, spi, uart};
+use rp2040_hal::{Sio, Spi, Timer, pac, spi, uart};
 
 const BAUD: u32 = 460_800;
 
@@ -41,11 +41,16 @@ pub type DataReady = Pin<Gpio20, FunctionSioInput>;
 /// The serial port on pins.
 pub type Uart = Uart0Port<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart, PullUp>)>;
 
+/// An RP2040 with these wires.
+pub type WiredRp2040 = Rp2040<DataReady, SensorSpi0, Select, Uart>;
+
 /// Starts a board. `has_usb` starts USB, `has_reset_line` drives RST high.
-pub fn start<B>(device: pac::Peripherals, queues: UartQueues, has_usb: bool, has_reset_line: bool) -> BoardParts<B>
-where
-    B: BoardSupport<Microcontroller = Rp2040, DataReady = DataReady, Spi = SensorSpi0, Select = Select, Uart = Uart>,
-{
+pub fn start(
+    device: pac::Peripherals,
+    queues: UartQueues,
+    has_usb: bool,
+    has_reset_line: bool,
+) -> BoardParts<WiredRp2040> {
     let cause = boot_cause(&device.VREG_AND_CHIP_RESET, &device.WATCHDOG);
     let mut resets = device.RESETS;
     let sio = Sio::new(device.SIO);
@@ -55,14 +60,19 @@ where
     let reset = pins.gpio21;
     let reset_line = has_reset_line.then(|| reset.into_push_pull_output_in_state(gpio::PinState::High).into_dyn_pin());
     let mut led = pins.gpio25.into_push_pull_output().into_dyn_pin();
-    let parts = ClockParts {
-        crystal: device.XOSC,
-        clocks: device.CLOCKS,
-        plls: (device.PLL_SYS, device.PLL_USB),
-        timer: device.TIMER,
-    };
-    let supervision = (device.WATCHDOG, &device.VREG_AND_CHIP_RESET);
-    let clocks = Rp2040::start(parts, supervision, &mut resets, &mut led);
+    let mut watchdog = start_watchdog(device.WATCHDOG, &device.VREG_AND_CHIP_RESET);
+    start_crystal(&device.XOSC, &mut led, &watchdog);
+    let clocks = init_clocks_and_plls(
+        CRYSTAL_HZ,
+        device.XOSC,
+        device.CLOCKS,
+        device.PLL_SYS,
+        device.PLL_USB,
+        &mut resets,
+        &mut watchdog,
+    );
+    let Ok(clocks) = clocks else { panic!("the clocks do not start") };
+    let _timer_runs_on = Timer::new(device.TIMER, &mut resets, &clocks);
     let (peripheral, core_hz) = (clocks.peripheral_clock.freq(), clocks.system_clock.freq().to_Hz());
 
     let settings = uart::UartConfig::new(BAUD.Hz(), uart::DataBits::Eight, None, uart::StopBits::One);

@@ -4,10 +4,15 @@ use super::flash::Stm32Flash;
 use super::watchdog;
 use crate::board::BrownOutLevel;
 use crate::bus_frame::{MicrosecondCounter, wait_for};
-use crate::microcontroller::{Microcontroller, first_cause};
+use crate::microcontroller::sensor_spi::SpiPeripheral;
+use crate::microcontroller::{DataReadyPin, Microcontroller, first_cause};
+use crate::receive::ServedPort;
 use crate::watchdog::Watchdog;
+use core::convert::Infallible;
+use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::{NVIC, SCB};
+use embedded_hal::digital::OutputPin;
 use link::{BootCause, ClockSource};
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, IWDG, RCC, SYSCFG, TIM2};
@@ -43,10 +48,10 @@ fn boot_cause(rcc: &RCC) -> BootCause {
     first_cause(causes)
 }
 
-/// An STM32F4 with running clock and watchdog.
-pub struct Stm32f4;
+/// An STM32F4 with running clock and watchdog: data-ready pin `D`, SPI `P` with chip select `S`, serial port `U`.
+pub struct Stm32f4<D = (), P = (), S = (), U = ()>(PhantomData<(D, P, S, U)>);
 
-impl Watchdog for Stm32f4 {
+impl<D, P, S, U> Watchdog for Stm32f4<D, P, S, U> {
     fn feed() {
         watchdog::feed();
     }
@@ -132,20 +137,26 @@ fn enter_boot_loader(rcc: &RCC) -> ! {
     }
 }
 
-impl MicrosecondCounter for Stm32f4 {
+impl<D, P, S, U> MicrosecondCounter for Stm32f4<D, P, S, U> {
     fn counter() -> u32 {
         // SAFETY: a read without side effects.
         unsafe { (*TIM2::ptr()).cnt().read().cnt().bits() }
     }
 }
 
-impl Microcontroller for Stm32f4 {
-    type Flash = Stm32Flash;
+impl<D: DataReadyPin, P: SpiPeripheral, S: OutputPin<Error = Infallible>, U: ServedPort> Microcontroller
+    for Stm32f4<D, P, S, U>
+{
+    type DataReady = D;
+    type Spi = P;
+    type Select = S;
+    type Uart = U;
     type Output = ErasedPin<Output>;
+    type Flash = Stm32Flash;
     #[cfg(feature = "feather-usb")]
     type Usb = super::usb::Stm32UsbPort;
     #[cfg(not(feature = "feather-usb"))]
-    type Usb = core::convert::Infallible;
+    type Usb = Infallible;
 
     fn restart() -> ! {
         SCB::sys_reset()
@@ -154,29 +165,33 @@ impl Microcontroller for Stm32f4 {
     /// The boot loader is entered at the next start, when everything is as after a reset.
     fn start_boot_loader() -> ! {
         REQUEST.store(BOOT_LOADER_REQUEST, Relaxed);
-        SCB::sys_reset()
+        Self::restart()
     }
 
-    /// Programs brown-out level 3, 2.7 V for 168 MHz, in the option bytes (RM0090 sections 3.7.2 and 3.7.3); takes
-    /// milliseconds.
     fn program_brown_out() -> BrownOutLevel {
-        // SAFETY: only this function uses the flash memory's registers after the start.
-        let flash = unsafe { &*FLASH::ptr() };
-        if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 {
-            return BrownOutLevel::Set;
-        }
-        for key in OPTION_KEYS {
-            // SAFETY: the values that unlock the option bytes.
-            flash.optkeyr().write(|w| unsafe { w.bits(key) });
-        }
-        let is_ready = || (0..1000).any(|_| wait_for(|| flash.sr().read().bsy().bit_is_clear()));
-        let done = is_ready() && {
-            // SAFETY: one of the four levels.
-            flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(BROWN_OUT_LEVEL_3) });
-            flash.optcr().modify(|_, w| w.optstrt().set_bit());
-            is_ready()
-        };
-        flash.optcr().modify(|_, w| w.optlock().set_bit());
-        if done { BrownOutLevel::Programmed } else { BrownOutLevel::Failed }
+        program_brown_out()
     }
+}
+
+/// Programs brown-out level 3, 2.7 V for 168 MHz, in the option bytes (RM0090 sections 3.7.2 and 3.7.3); takes
+/// milliseconds.
+fn program_brown_out() -> BrownOutLevel {
+    // SAFETY: only this function uses the flash memory's registers after the start.
+    let flash = unsafe { &*FLASH::ptr() };
+    if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 {
+        return BrownOutLevel::Set;
+    }
+    for key in OPTION_KEYS {
+        // SAFETY: the values that unlock the option bytes.
+        flash.optkeyr().write(|w| unsafe { w.bits(key) });
+    }
+    let is_ready = || (0..1000).any(|_| wait_for(|| flash.sr().read().bsy().bit_is_clear()));
+    let done = is_ready() && {
+        // SAFETY: one of the four levels.
+        flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(BROWN_OUT_LEVEL_3) });
+        flash.optcr().modify(|_, w| w.optstrt().set_bit());
+        is_ready()
+    };
+    flash.optcr().modify(|_, w| w.optlock().set_bit());
+    if done { BrownOutLevel::Programmed } else { BrownOutLevel::Failed }
 }

@@ -1,12 +1,17 @@
 //! The sensor's wires to an STM32F4: bus and data-ready input.
 
 use super::bus::{Spi1, spi1_bus};
+use super::port::UsartPort;
 use super::start::{Started, Stm32f4};
-use crate::microcontroller::{BoardParts, BoardSupport, DataReadyPin, UsbOf, UsbParts};
+use crate::microcontroller::{BoardParts, DataReadyPin, Microcontroller, UsbParts};
 use stm32f4xx_hal::gpio::{Edge, ErasedPin, ExtiPin, Input, Output, PA4, PA5, PA6, PA7, Pin};
 use stm32f4xx_hal::pac::{DMA2, EXTI, SPI1, SYSCFG};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::serial::Instance;
+
+/// An STM32F4 with the sensor on SPI1 and PA4, DIO1 at a pin of port `P`, and the USART `U`.
+pub type WiredStm32f4<const P: char, const N: u8, U> = Stm32f4<Pin<P, N, Input>, Spi1, PA4<Output>, UsartPort<U>>;
 
 /// The wires of the sensor on a board.
 pub struct SensorWires<const P: char, const N: u8> {
@@ -22,17 +27,13 @@ pub struct SensorWires<const P: char, const N: u8> {
 
 impl Started {
     /// The parts of a board with these wires, without a reset line.
-    pub fn board<B, const P: char, const N: u8>(
+    pub fn board<const P: char, const N: u8, U: Instance>(
         self,
         sensor: SensorWires<P, N>,
-        uart: B::Uart,
-        usb: Option<UsbParts<UsbOf<B>>>,
+        uart: UsartPort<U>,
+        usb: Option<UsbParts<<WiredStm32f4<P, N, U> as Microcontroller>::Usb>>,
         led: ErasedPin<Output>,
-    ) -> BoardParts<B>
-    where
-        Pin<P, N, Input>: ExtiPin,
-        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Spi = Spi1, Select = PA4<Output>>,
-    {
+    ) -> BoardParts<WiredStm32f4<P, N, U>> {
         let Self { cause, clock, mut rcc } = self;
         let bus = spi1_bus(sensor.spi, sensor.pins, &mut rcc);
         let data_ready = data_ready_input(sensor.data_ready, sensor.edges, &mut rcc);

@@ -129,11 +129,17 @@ impl SampleSpectrum {
         2.0 * (objective(other) - objective(one))
     }
 
+    /// The mean density of white noise behind a filter, or of none, in each band.
+    pub(crate) fn shape(&self, filtered: NoiseTerm) -> Vec<f64> {
+        let shapes = Shapes::new(self, &[filtered]);
+        shapes.in_bands(shapes.all[0])
+    }
+
     /// Its likelihood with the terms `kinds`, of which the first is noise behind a filter.
-    pub(crate) fn behind(&self, kinds: &[NoiseTerm]) -> SpectrumBehindFilter<'_> {
+    pub(crate) fn behind(&self, kinds: &[NoiseTerm]) -> SpectrumBehindFilter {
         let as_measured = |band: &SpectralBand| band.ordinates * (band.density.max(f64::MIN_POSITIVE).ln() + 1.0);
         let saturated = self.bands.iter().map(|band| as_measured(&band.measured)).sum();
-        SpectrumBehindFilter { spectrum: self, likelihood: Likelihood::new(self, kinds), saturated }
+        SpectrumBehindFilter { likelihood: Likelihood::new(self, kinds), saturated }
     }
 
     /// Leaves out the bands into whose first, middle or last coefficient behind `filter` the ends of the record leak. Few
@@ -163,18 +169,18 @@ impl SampleSpectrum {
 
 /// The likelihood of a spectrum behind a filter that is read at one rate or another. What else passes the filter has its gain at the rate
 /// that it was made for: it is slow against any filter.
-pub(crate) struct SpectrumBehindFilter<'a> {
-    spectrum: &'a SampleSpectrum,
+pub(crate) struct SpectrumBehindFilter {
     likelihood: Likelihood,
     /// The objective of a spectrum that is as measured.
     saturated: f64,
 }
 
-impl SpectrumBehindFilter<'_> {
-    /// With this filter in place of the first term: twice what the logarithm of the likelihood, with the likeliest coefficients, is below
-    /// that of a spectrum that is as measured. A true model has about the number of [bands](SampleSpectrum::bands).
-    pub(crate) fn deviance(&self, filtered: NoiseTerm) -> f64 {
-        2.0 * (self.likelihood.with_first(&Shapes::new(self.spectrum, &[filtered])) - self.saturated)
+impl SpectrumBehindFilter {
+    /// With a filter of this [shape](SampleSpectrum::shape) in place of the first term: twice what the logarithm of the likelihood, with the
+    /// likeliest coefficients, is below that of a spectrum that is as measured. A true model has about the number of
+    /// [bands](SampleSpectrum::bands).
+    pub(crate) fn deviance(&self, filtered: &[f64]) -> f64 {
+        2.0 * (self.likelihood.with_first(filtered) - self.saturated)
     }
 }
 
@@ -351,11 +357,10 @@ impl Likelihood {
         Self { bands, bases, densities, objective, known }
     }
 
-    /// The objective at its minimum with another shape in place of the first one: the first of `shapes`.
-    fn with_first(&self, shapes: &Shapes) -> f64 {
+    /// The objective at its minimum with another shape in place of the `first` one.
+    fn with_first(&self, first: &[f64]) -> f64 {
         let mut bases = self.bases.clone();
-        let first = shapes.in_bands(shapes.all[0]);
-        bases.iter_mut().zip(first).for_each(|(basis, first)| basis[0] = first);
+        bases.iter_mut().zip(first).for_each(|(basis, first)| basis[0] = *first);
         let held: Vec<usize> = self.known.into_iter().collect();
         fit_mixture_with(&self.bands, &bases, Sign::NonNegative, &held, &mut self.densities.clone())
     }

@@ -60,6 +60,7 @@ pub(super) struct SampleBand {
 }
 
 /// The coefficients that a band averages.
+#[derive(PartialEq)]
 pub(super) enum Place {
     /// Squares of the coefficients of the cosine transform, of the orders 1, 2, 3 … from index 0 on.
     Coefficients(Range<usize>),
@@ -109,6 +110,13 @@ impl SampleSpectrum {
             rounding: rounding.clone(),
             interpolated,
         }
+    }
+
+    /// True if the bands of another spectrum average the same coefficients, so that a model has the same densities there.
+    pub(crate) fn has_bands_of(&self, other: &Self) -> bool {
+        let layout = |of: &Self| (of.count, of.samples_per_mean, of.period, of.resolution, of.point_resolution);
+        layout(self) == layout(other)
+            && self.bands.iter().map(|of| &of.place).eq(other.bands.iter().map(|of| &of.place))
     }
 
     /// True if at most a thousandth of the samples is interpolated.

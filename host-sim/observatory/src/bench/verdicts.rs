@@ -146,7 +146,7 @@ impl fmt::Display for Cause {
             Self::SckTooFast => "SCK is set above the sensor's limit.",
             Self::FramesTooSoon => "Frames follow one another too soon for the sensor.",
             Self::WritesDamaged(bits) => {
-                return write!(f, "What is written arrives damaged in the bits {bits:#06x}: the wire of DIN.");
+                return write!(f, "Written values arrive damaged in the bits {bits:#06x}: the wire of DIN.");
             }
             Self::SelfTest(sensors) => {
                 return write!(f, "Self-test failed: {sensors}. Keep the sensor still and repeat; else it is broken.");

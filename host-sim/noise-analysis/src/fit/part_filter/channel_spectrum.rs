@@ -31,7 +31,10 @@ pub(super) struct ChannelSpectrum {
 }
 
 /// The spectrum of a channel behind one filter, with each set of other terms.
-pub(super) struct ChannelBehindFilter<'a>(Vec<(SpectrumBehindFilter<'a>, f64)>);
+pub(super) struct ChannelBehindFilter<'a> {
+    spectrum: &'a SampleSpectrum,
+    behind: Vec<(SpectrumBehindFilter, f64)>,
+}
 
 impl ChannelSpectrum {
     /// `None` where the means of the samples alone are kept.
@@ -61,22 +64,35 @@ impl ChannelSpectrum {
 
     /// The least deviance without a filter.
     pub(super) fn unfiltered(&self) -> f64 {
-        self.behind(NoiseTerm::AngleRandomWalk).deviance(NoiseTerm::AngleRandomWalk)
+        self.behind(NoiseTerm::AngleRandomWalk).deviance(&self.spectrum.shape(NoiseTerm::AngleRandomWalk))
     }
 
     /// Behind a filter, or one that is not much different.
     pub(super) fn behind(&self, filtered: NoiseTerm) -> ChannelBehindFilter<'_> {
         let behind = |(others, cost): &(Vec<NoiseTerm>, f64)| (self.spectrum.behind(&kinds(filtered, others)), *cost);
-        ChannelBehindFilter(self.others.iter().map(behind).collect())
+        ChannelBehindFilter { spectrum: &self.spectrum, behind: self.others.iter().map(behind).collect() }
     }
 }
 
 impl ChannelBehindFilter<'_> {
-    /// The deviance with white noise behind this filter, and with the other terms of the channel or without those of them that may stand in for
-    /// another filter, with what the terms cost, whichever is least.
-    pub(super) fn deviance(&self, filtered: NoiseTerm) -> f64 {
-        self.0.iter().map(|(spectrum, cost)| spectrum.deviance(filtered) + cost).fold(f64::INFINITY, f64::min)
+    /// The deviance with white noise behind a filter of this shape, and with the other terms of the channel or without those of them that may
+    /// stand in for another filter, with what the terms cost, whichever is least.
+    fn deviance(&self, filtered: &[f64]) -> f64 {
+        self.behind.iter().map(|(spectrum, cost)| spectrum.deviance(filtered) + cost).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// The deviance of each channel with white noise behind the filter `filtered`, whose shape neighbours with the same bands share.
+pub(super) fn deviances<'a>(
+    channels: impl Iterator<Item = &'a ChannelBehindFilter<'a>>,
+    filtered: NoiseTerm,
+) -> impl Iterator<Item = f64> {
+    let mut last: Option<(&SampleSpectrum, Vec<f64>)> = None;
+    channels.map(move |channel| {
+        let shared = last.take().filter(|(spectrum, _)| spectrum.has_bands_of(channel.spectrum));
+        let (_, shape) = last.insert(shared.unwrap_or_else(|| (channel.spectrum, channel.spectrum.shape(filtered))));
+        channel.deviance(shape)
+    })
 }
 
 /// White noise behind a filter, `filtered`, or of none, with the terms `others`. At the filter's own rate white noise after the filter is told

@@ -1,6 +1,6 @@
 //! Filters of one family, by the deviances of all channels.
 
-use super::channel_spectrum::{ChannelBehindFilter, ChannelSpectrum};
+use super::channel_spectrum::{ChannelBehindFilter, ChannelSpectrum, deviances};
 use super::family::Family;
 use crate::bounds::BoundedEstimate;
 use crate::minimum::{least_within, risen};
@@ -41,8 +41,8 @@ impl<'a> TriedFamily<'a> {
     fn new(family: Family, channels: &'a [ChannelSpectrum], tried: Vec<f64>) -> Option<Self> {
         let middle = family.with(*tried.get(tried.len() / 2)?);
         let behind: Vec<ChannelBehindFilter> = channels.iter().map(|channel| channel.behind(middle)).collect();
-        let deviances = |at: f64| behind.iter().map(|of| of.deviance(family.with(at))).collect();
-        Some(Self { channels, family, tried: tried.into_iter().map(|at| (at, deviances(at))).collect() })
+        let tried_at = |at: f64| (at, deviances(behind.iter(), family.with(at)).collect());
+        Some(Self { channels, family, tried: tried.into_iter().map(tried_at).collect() })
     }
 
     /// The deviances of each channel.
@@ -68,7 +68,7 @@ impl<'a> TriedFamily<'a> {
         let likelier = |best: (f64, f64), next: (f64, f64)| if next.1 < best.1 { next } else { best };
         let whole = whole.map(f64::from).map(|of| (of, sum(of)));
         let (adjusted, _) = whole.fold((between, sum(between)), likelier);
-        let deviances = behind.iter().map(|of| of.deviance(family.with(adjusted))).collect();
+        let deviances = deviances(behind.iter(), family.with(adjusted)).collect();
         Hypothesis { family: *family, adjusted, range, deviances }
     }
 
@@ -107,8 +107,9 @@ fn weighted(deviances: &[f64], weights: &[f64]) -> f64 {
 
 /// The sum of the deviances of the channels that have a weight.
 fn sum_behind(behind: &[ChannelBehindFilter], weights: &[f64], family: Family, adjusted: f64) -> f64 {
-    let weighted = behind.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
-    weighted.map(|(of, weight)| weight * of.deviance(family.with(adjusted))).sum()
+    let (used, weights): (Vec<&ChannelBehindFilter>, Vec<f64>) =
+        behind.iter().zip(weights.iter().copied()).filter(|(_, weight)| *weight > 0.0).unzip();
+    deviances(used.into_iter(), family.with(adjusted)).zip(weights).map(|(deviance, weight)| weight * deviance).sum()
 }
 
 /// The position of the simplest of those of `tried` whose `total` is above the least one by at most `rise`, and the other taps of these. Every
