@@ -15,7 +15,7 @@ use recordings::{InputError, MemoryTable, ReadMonitor, serial};
 use reports::export::AxisChoice;
 use reports::reading::ReadingOptions;
 use simulation::Simulation;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -555,8 +555,17 @@ pub(crate) fn set_typed(words: &[OsString]) {
     let _ = TYPED.set(words.iter().map(|word| word.to_string_lossy().into_owned()).collect());
 }
 
-/// The options that were given to `analyze`, without those that a proposed command states itself.
-pub(crate) fn other_options() -> Vec<String> {
+/// A file name with a number before its ending: `report-2.html`, `sensor-2.kalibr.yaml`.
+fn numbered(file: &str, number: usize) -> String {
+    let path = Path::new(file);
+    let name = path.file_name().map(OsStr::to_string_lossy).unwrap_or_default();
+    let (stem, ending) = name.split_at(name.find('.').unwrap_or(name.len()));
+    path.with_file_name(format!("{stem}-{number}{ending}")).display().to_string()
+}
+
+/// The options that were given to `analyze`, without those that a proposed command states itself. With the `number` of the command among
+/// several, its output files have it in their names.
+pub(crate) fn other_options(number: Option<usize>) -> Vec<String> {
     let mut program = Cli::command();
     let typed = program.try_get_matches_from_mut(TYPED.get().into_iter().flatten()).ok();
     let (Some(typed), Some(analyze)) = (&typed, program.find_subcommand("analyze")) else { return Vec::new() };
@@ -570,8 +579,12 @@ pub(crate) fn other_options() -> Vec<String> {
         }
         let option = argument.get_short().map_or_else(|| format!("--{long}"), |short| format!("-{short}"));
         if argument.get_action().takes_values() {
-            let values = typed.get_raw(id).into_iter().flatten();
-            options.extend(values.flat_map(|value| [option.clone(), value.to_string_lossy().into_owned()]));
+            let values = typed.get_raw(id).into_iter().flatten().map(|value| value.to_string_lossy().into_owned());
+            let of_command = |value: String| match number {
+                Some(number) if long == "output" && value != "-" => numbered(&value, number),
+                _ => value,
+            };
+            options.extend(values.flat_map(|value| [option.clone(), of_command(value)]));
         } else {
             options.push(option);
         }

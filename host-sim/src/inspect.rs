@@ -150,15 +150,15 @@ impl Contents {
         arguments
     }
 
-    /// The command that analyses a sensor, with the options that the user gave.
-    fn command(&self, proposal: &Proposal) -> String {
+    /// The command that analyses a sensor, with the options that the user gave, and its `number` among several in what it writes.
+    fn command(&self, proposal: &Proposal, number: Option<usize>) -> String {
         let mut arguments = self.arguments(proposal);
         // If the file has one sensor that the format identifies, the command needs no topic.
         let is_only = self.proposals().count() == 1 && self.several.is_empty() && proposal.is_found;
         arguments.input.topic = arguments.input.topic.filter(|_| !is_only || self.given.input.topic.is_some());
         let file = self.given.input.file.display().to_string();
         let rate = ["--rate", "HZ"].into_iter().filter(|_| proposal.lacks_rate).map(str::to_owned);
-        let words = [file].into_iter().chain(arguments.options(false)).chain(rate).chain(cli::other_options());
+        let words = [file].into_iter().chain(arguments.options(false)).chain(rate).chain(cli::other_options(number));
         format!("imunoise analyze {}", words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" "))
     }
 }
@@ -191,8 +191,9 @@ impl Display for Contents {
             return writeln!(f, "\nno column is known to be one of an inertial sensor; {how}");
         }
         writeln!(f, "\nto analyse it:")?;
-        for proposal in self.proposals() {
-            writeln!(f, "  {}", self.command(proposal))?;
+        let are_several = self.proposals().count() > 1;
+        for (proposal, number) in self.proposals().zip(1..) {
+            writeln!(f, "  {}", self.command(proposal, are_several.then_some(number)))?;
             for doubt in &proposal.doubts {
                 writeln!(f, "    in doubt: {doubt}")?;
             }
@@ -343,7 +344,7 @@ pub(crate) fn read_or_ask<R>(
     let proposals: Vec<&Proposal> = contents.proposals().collect();
     let hint = match proposals.as_slice() {
         [proposal] if *accept_guess && proposal.is_safe() => {
-            note(format_args!("guessed: {}", contents.command(proposal)));
+            note(format_args!("guessed: {}", contents.command(proposal, None)));
             return read(&contents.arguments(proposal));
         }
         [proposal] if proposal.is_safe() => "--accept-guess takes this guess\n",

@@ -2,6 +2,7 @@
 
 pub(crate) mod column_selection;
 pub(crate) mod printable;
+pub(crate) mod sensor;
 pub(crate) mod unit;
 
 /// Those of a gyroscope.

@@ -6,13 +6,13 @@ mod steady_part;
 mod unit_guess;
 
 use crate::columns::column_selection::ColumnSelection;
+use crate::columns::sensor::SensorChannels;
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::rows::batch::Batch;
 use crate::rows::padding::PaddingFinder;
 use crate::rows::row_source::BATCH;
 use crate::rows::whole_table::WholeTable;
-use measurement::SensorProfile;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use time_base::{Clock, Place, RowStamp};
@@ -84,7 +84,7 @@ pub struct InspectedTable {
 
 impl InspectedTable {
     /// `sensor` gives counts, `selection` the user's choice.
-    pub(crate) fn new(table: WholeTable, sensor: &SensorProfile, selection: &ColumnSelection) -> Self {
+    pub(crate) fn new(table: WholeTable, sensor: &SensorChannels, selection: &ColumnSelection) -> Self {
         let (table, before) = without_padding(table);
         let facts: Vec<ColumnFacts> = table.columns.iter().map(ColumnFacts::new).collect();
         let sensors = SensorGuess::all(&table, &facts, sensor, selection);
@@ -100,7 +100,7 @@ impl InspectedTable {
             columns: Vec::new(),
             rate: None,
             stated_rate_hz: table.rate_hz,
-            duration_s: times.as_ref().map(|times| times.duration_s()),
+            duration_s: times.as_ref().and_then(|times| times.seconds.last().copied()),
             missing: 0,
             gaps: 0,
             steady: SteadyPart::find(&facts, &sensors),

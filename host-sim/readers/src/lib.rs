@@ -1,7 +1,7 @@
 //! Readers of recordings of inertial sensors: text, NumPy, MATLAB, HDF5, ROS bags, MCAP, flight logs.
 //!
 //! [`InputFile`] recognises a format by content; every format becomes batches of columns ([`FileRows`]) as the file or
-//! the user ([`ReadOptions`]) says.
+//! the user ([`RowOptions`]) says.
 
 mod columns;
 mod formats;
@@ -9,8 +9,9 @@ mod input;
 pub mod inspection;
 mod rows;
 
-pub use columns::column_selection::{ColumnSelection, ReadOptions, SelectionError, is_output_register};
+pub use columns::column_selection::{ColumnSelection, RowOptions, SelectionError, is_output_register};
 pub use columns::printable::Printable;
+pub use columns::sensor::{SensorChannel, SensorChannels};
 pub use columns::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
 pub use formats::file_format::{FileFormat, HEAD_BYTES, InputFile, TopicDescription, files_of_bag};
 pub use formats::memory_table::{MemoryArray, MemoryColumn, MemoryTable};

@@ -2,7 +2,7 @@
 
 use crate::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, Verdict};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
-use measurement::adis16405;
+use measurement::{ChannelProfile, SensorProfile, adis16405};
 use readers::{
     Batch, FileRows, PartFilter, ReadMonitor, RegisterField, RowsRead, StreamError, ValueColumn, WantedRows,
     may_begin_threads,
@@ -16,27 +16,46 @@ pub(crate) fn field(channel: Channel) -> RegisterField {
     RegisterField { place: channel as usize, limits: channel.limits() }
 }
 
-pub(crate) fn channel(column: &ValueColumn) -> Option<Channel> {
-    column.register.and_then(|register| Channel::ALL.get(register.place).copied())
+/// A column of values with the profile of its channel, whose LSB is not that of the numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ProfiledColumn {
+    pub(crate) profile: ChannelProfile,
+    /// For 1, in the profile's unit.
+    pub(crate) factor: f64,
+    pub(crate) label: String,
+    pub(crate) register: Option<RegisterField>,
+}
+
+impl ProfiledColumn {
+    fn new(column: &ValueColumn, sensor: &SensorProfile) -> Option<Self> {
+        let ValueColumn { channel, factor, label, register } = column.clone();
+        Some(Self { profile: sensor.channel(channel.name)?, factor, label, register })
+    }
+}
+
+pub(crate) fn channel(register: Option<RegisterField>) -> Option<Channel> {
+    register.and_then(|register| Channel::ALL.get(register.place).copied())
 }
 
 pub(crate) enum BatchSource<'a> {
     /// Register counts have a validator.
-    File(FileRows<'a>, Option<Recorder>),
+    File(FileRows<'a>, Vec<ProfiledColumn>, Option<Box<Recorder>>),
     Recording(RecordedRows<'a>),
 }
 
 impl<'a> BatchSource<'a> {
     /// Any sensor, or an ADIS16405's counts in `range`.
-    pub(crate) fn file(rows: FileRows<'a>, range: Option<GyroRange>) -> Self {
-        let channels: Option<Vec<Channel>> = rows.columns().iter().map(channel).collect();
-        let validator = range.zip(channels).map(|(range, channels)| Recorder::new(channels, range));
-        Self::File(rows, validator)
+    pub(crate) fn file(rows: FileRows<'a>, sensor: &SensorProfile, range: Option<GyroRange>) -> Self {
+        let columns: Vec<ProfiledColumn> =
+            rows.columns().iter().filter_map(|column| ProfiledColumn::new(column, sensor)).collect();
+        let channels: Option<Vec<Channel>> = columns.iter().map(|column| channel(column.register)).collect();
+        let validator = range.zip(channels).map(|(range, channels)| Box::new(Recorder::new(channels, range)));
+        Self::File(rows, columns, validator)
     }
 
-    pub(crate) fn columns(&self) -> &[ValueColumn] {
+    pub(crate) fn columns(&self) -> &[ProfiledColumn] {
         match self {
-            Self::File(rows, _) => rows.columns(),
+            Self::File(_, columns, _) => columns,
             Self::Recording(recording) => &recording.columns,
         }
     }
@@ -44,7 +63,7 @@ impl<'a> BatchSource<'a> {
     /// Stated rate, Hz, if there are no time stamps.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
         match self {
-            Self::File(rows, _) => rows.rate_hz(),
+            Self::File(rows, ..) => rows.rate_hz(),
             Self::Recording(_) => None,
         }
     }
@@ -56,11 +75,11 @@ impl<'a> BatchSource<'a> {
         mut take: impl FnMut(Batch<Verdict>) -> Result<(), StreamError>,
     ) -> Result<RowsRead, StreamError> {
         let monitor = match self {
-            Self::File(rows, _) => rows.monitor().clone(),
+            Self::File(rows, ..) => rows.monitor().clone(),
             Self::Recording(_) => ReadMonitor::default(),
         };
         let read = |give: &mut dyn FnMut(Batch<Verdict>) -> bool| match self {
-            Self::File(rows, validator) => rows.read(wanted, &mut |batch| {
+            Self::File(rows, _, validator) => rows.read(wanted, &mut |batch| {
                 let verdicts = validator.as_mut().map(|validator| verdicts(validator, &batch));
                 give(batch.with_verdicts(verdicts.unwrap_or_default()))
             }),
@@ -111,7 +130,7 @@ fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
 
 pub(crate) struct RecordedRows<'a> {
     recording: &'a Recording,
-    columns: Vec<ValueColumn>,
+    columns: Vec<ProfiledColumn>,
     has_times: bool,
     has_indices: bool,
 }
@@ -121,7 +140,7 @@ impl<'a> RecordedRows<'a> {
         let profile = adis16405::profile(recording.range.lsb());
         let column = |&channel: &Channel| {
             let profile = profile.channels[channel as usize];
-            ValueColumn {
+            ProfiledColumn {
                 profile,
                 factor: profile.lsb,
                 label: channel.name().to_owned(),

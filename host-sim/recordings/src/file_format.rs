@@ -3,11 +3,11 @@
 use crate::batch_source::{BatchSource, field};
 use crate::counts::{count_table_writer, frame_log, recorded_file, serial};
 use adis16405_driver::{Channel, GyroRange};
-use measurement::{SensorProfile, adis16405};
+use measurement::{ChannelProfile, SensorProfile, adis16405};
 use readers::inspection::InspectedTable;
 use readers::{
     ColumnSelection, FileBytes, FileHash, FileRows, HEAD_BYTES, InputError, InputFile, MemoryTable, ReadMonitor,
-    ReadOptions, Reason, is_output_register,
+    Reason, RowOptions, SensorChannel, SensorChannels, is_output_register,
 };
 use std::io::{self, BufReader};
 use std::ops::Deref;
@@ -16,6 +16,24 @@ use std::sync::Arc;
 use tempfile::NamedTempFile;
 
 pub use readers::{FileFormat, TopicDescription, files_of_bag};
+
+/// The recording as the user states it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    pub sensor: SensorProfile,
+    /// Columns and units.
+    pub selection: ColumnSelection,
+    pub topic: Option<String>,
+}
+
+/// What the readers need of a profile.
+fn channels_of(sensor: &SensorProfile) -> SensorChannels {
+    let channel = |of: &ChannelProfile| {
+        let has_counts = *of != ChannelProfile::generic(of.name, of.quantity);
+        SensorChannel { name: of.name, unit: of.quantity.unit(), lsb: Some(of.lsb).filter(|_| has_counts) }
+    };
+    SensorChannels { name: sensor.name, channels: sensor.channels.iter().map(channel).collect() }
+}
 
 /// The format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,7 +158,7 @@ impl RecordedInput {
         options: &ReadOptions,
         range: Option<GyroRange>,
     ) -> Result<BatchSource<'_>, InputError> {
-        Ok(BatchSource::file(self.rows(options, range.is_some())?, range))
+        Ok(BatchSource::file(self.rows(options, range.is_some())?, &options.sensor, range))
     }
 
     fn check_columns(&self) -> Result<(), InputError> {
@@ -164,7 +182,8 @@ impl RecordedInput {
             format => format.is_text() && names.iter().any(|name| is_output_register(name)),
         };
         let sensor = |names: &[&str]| {
-            if is_of_registers(names) { adis16405::profile(adis16405::GYRO_LSB_300) } else { SensorProfile::generic() }
+            let of_part = || channels_of(&adis16405::profile(adis16405::GYRO_LSB_300));
+            if is_of_registers(names) { of_part() } else { SensorChannels::generic() }
         };
         let mut tables = self.file.inspect(topic, selection, &sensor)?;
         for table in &mut tables {
@@ -208,9 +227,11 @@ pub(crate) fn rows<'a>(
         let channel = Channel::ALL.into_iter().find(|channel| are_registers && channel.name() == name);
         channel.map(field)
     };
-    file.rows(options, &register)
+    let ReadOptions { sensor, selection, topic } = options.clone();
+    file.rows(&RowOptions { sensor: channels_of(&sensor), selection, topic }, &register)
 }
 
 pub(crate) fn options_of_counts(range: GyroRange) -> ReadOptions {
-    ReadOptions::of_sensor(adis16405::profile(range.lsb()))
+    let sensor = adis16405::profile(range.lsb());
+    ReadOptions { sensor, selection: ColumnSelection::default(), topic: None }
 }

@@ -11,8 +11,9 @@ pub mod recording;
 pub mod time_base;
 
 pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial};
+pub use file_format::ReadOptions;
 pub use readers::{
     ColumnSelection, FileBytes, FileHash, InputError, MemoryArray, MemoryColumn, MemoryTable, Number, Printable,
-    ReadMonitor, ReadOptions, ReadPass, Reason, SelectionError, inspection, read_on_one_thread,
+    ReadMonitor, ReadPass, Reason, SelectionError, inspection, read_on_one_thread,
 };
 pub use reading::{count_table, row_writer, sample_stream};

@@ -96,6 +96,14 @@ fn each_sensor_of_a_file_is_a_recording() {
     let batch = [&["batch"], &analyze[1..], &["-o", reports.to_str().expect("UTF-8")]].concat();
     assert!(imunoise(&batch).status.success());
     assert_eq!(std::fs::read_dir(&reports).expect("a folder").count(), 2);
+    // Each of the commands that are proposed writes a file of its own.
+    let proposed =
+        imunoise(&[&["analyze", file.to_str().expect("UTF-8")], &columns[..], &["-o", "page.v2.html"]].concat());
+    let proposed = String::from_utf8(proposed.stderr).expect("UTF-8");
+    for (topic, output) in [("left", "page-1.v2.html"), ("right", "page-2.v2.html")] {
+        let command = proposed.lines().find(|line| line.contains(&format!("--topic {topic}"))).expect(&proposed);
+        assert!(command.contains(&format!(" -o {output}")), "{proposed}");
+    }
     let inspected = text(&["inspect", file.to_str().expect("UTF-8")]);
     assert!(inspected.contains("--topic left") && inspected.contains("--topic right"), "{inspected}");
     // That the columns are rates is in doubt, and `--each-sensor` takes no guess in doubt.

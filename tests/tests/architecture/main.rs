@@ -32,7 +32,7 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("fourier", ""),
     ("measurement", "allan-core"),
     ("time-base", ""),
-    ("readers", "measurement time-base"),
+    ("readers", "time-base"),
     ("recordings", "adis16405-driver link measurement readers time-base"),
     ("noise-analysis", "allan-core fourier measurement"),
     ("virtual-sensor", ""),

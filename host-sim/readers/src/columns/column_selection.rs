@@ -2,19 +2,15 @@
 
 use crate::columns;
 use crate::columns::printable::Printable;
+use crate::columns::sensor::{INERTIAL, SensorChannel, SensorChannels};
 use crate::columns::unit::{COUNT, SECOND, Unit};
-use measurement::{ChannelProfile, Quantity, SensorProfile};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "a file has few columns, and a profile is copied as the rest of a column is"
-)]
 pub(crate) enum Role {
     Time,
     /// Running number of a sample.
     Index,
-    Channel(ChannelProfile),
+    Channel(SensorChannel),
 }
 
 impl Role {
@@ -22,7 +18,7 @@ impl Role {
         match self {
             Self::Time => "time",
             Self::Index => "sample",
-            Self::Channel(profile) => profile.name,
+            Self::Channel(channel) => channel.name,
         }
     }
 }
@@ -36,7 +32,7 @@ pub(crate) struct AvailableColumn {
 }
 
 pub(crate) fn as_they_are(available: &[AvailableColumn]) -> Vec<ChosenColumn> {
-    let role = Role::Channel(ChannelProfile::generic("", Quantity::AuxiliaryVoltage));
+    let role = Role::Channel(SensorChannel { name: "", unit: "V", lsb: None });
     let column = |(position, column): (usize, &AvailableColumn)| {
         let (label, unit) = (column.name.clone(), column.unit);
         ChosenColumn { position, role, label, unit, factor: 1.0 }
@@ -120,7 +116,7 @@ impl ColumnSelection {
 
     /// Assigned channels, `time` and `sample`, each with its column's position in `available`.
     pub(crate) fn assignments(&self, available: &[AvailableColumn]) -> Vec<(&'static str, usize)> {
-        let sensor = SensorProfile::generic();
+        let sensor = SensorChannels::generic();
         let assigned = self.assigned(available, &sensor).unwrap_or_default();
         assigned.into_iter().map(|(role, position)| (role.name(), position)).collect()
     }
@@ -147,7 +143,7 @@ impl ColumnSelection {
     pub(crate) fn choose(
         &self,
         available: &[AvailableColumn],
-        sensor: &SensorProfile,
+        sensor: &SensorChannels,
     ) -> Result<Vec<ChosenColumn>, SelectionError> {
         let mut chosen = if self.assignments.is_empty() {
             by_name(available, sensor)?
@@ -174,29 +170,21 @@ impl ColumnSelection {
         chosen.sort_by_key(|(role, _)| match role {
             Role::Time => 0,
             Role::Index => 1,
-            Role::Channel(profile) => {
-                2 + sensor.channels.iter().position(|channel| channel.name == profile.name).unwrap_or(0)
-            }
+            Role::Channel(own) => 2 + sensor.channels.iter().position(|channel| channel.name == own.name).unwrap_or(0),
         });
         chosen.into_iter().map(|(role, position)| self.with_unit(role, position, &available[position])).collect()
     }
 
     /// Unitless columns of other quantities, by positions: a magnetometer or thermometer is no reason to ask.
     fn unitless_companions(&self, chosen: &[(Role, usize)], available: &[AvailableColumn]) -> Vec<usize> {
-        let quantity = |role: &Role| match role {
-            Role::Channel(profile) => Some(profile.quantity),
-            _ => None,
-        };
-        if !chosen.iter().any(|(role, _)| quantity(role).is_some_and(Quantity::is_inertial)) {
+        let channel = |role: &Role| if let Role::Channel(channel) = role { Some(*channel) } else { None };
+        if !chosen.iter().any(|(role, _)| channel(role).is_some_and(SensorChannel::is_inertial)) {
             return Vec::new();
         }
         let is_unitless = |(role, position): &(Role, usize)| {
-            quantity(role).is_some_and(|quantity| {
-                let column = &available[*position];
-                let own = column.unit.filter(|unit| unit.measures(quantity) || unit.base == COUNT);
-                let own = own.or_else(|| unit_by_interface(&column.name, quantity));
-                let stated = self.stated_unit(quantity.unit()).or_else(|| self.stated_unit(COUNT));
-                !quantity.is_inertial() && own.or(stated).is_none()
+            channel(role).is_some_and(|channel| {
+                let stated = self.stated_unit(channel.unit).or_else(|| self.stated_unit(COUNT));
+                !channel.is_inertial() && available[*position].unit_of(channel).or(stated).is_none()
             })
         };
         chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
@@ -207,7 +195,7 @@ impl ColumnSelection {
         &self,
         available: &[AvailableColumn],
         chosen: &[ChosenColumn],
-        sensor: &SensorProfile,
+        sensor: &SensorChannels,
     ) -> Vec<String> {
         // Positions may be those of a whole row.
         let is_used = |at: &usize| chosen.iter().any(|column| column.label == available[*at].name);
@@ -262,15 +250,15 @@ impl ColumnSelection {
     }
 
     fn unit_of_interface(&self, column: &ChosenColumn) -> Option<Unit> {
-        let Role::Channel(profile) = column.role else { return None };
-        let is_stated = self.stated_unit(profile.quantity.unit()).is_some();
-        unit_by_interface(&column.label, profile.quantity).filter(|unit| !is_stated && column.unit == Some(*unit))
+        let Role::Channel(channel) = column.role else { return None };
+        let is_stated = self.stated_unit(channel.unit).is_some();
+        unit_by_interface(&column.label, channel.unit).filter(|unit| !is_stated && column.unit == Some(*unit))
     }
 
     fn assigned(
         &self,
         available: &[AvailableColumn],
-        sensor: &SensorProfile,
+        sensor: &SensorChannels,
     ) -> Result<Vec<(Role, usize)>, SelectionError> {
         let mut assigned: Vec<(Role, usize)> = Vec::new();
         for (name, wanted) in &self.assignments {
@@ -308,21 +296,14 @@ impl ColumnSelection {
         let (unit, factor) = match role {
             Role::Index => (None, 1.0),
             Role::Time => (stated(SECOND).or(column.unit.filter(|unit| unit.base == SECOND)), 1.0),
-            Role::Channel(profile) => {
-                let own = column.unit.filter(|unit| unit.measures(profile.quantity) || unit.base == COUNT);
-                let own = own.or_else(|| stated(COUNT)).or_else(|| unit_by_interface(&column.name, profile.quantity));
-                let (name, channel, example) = (&column.name, profile.name, profile.quantity.unit());
-                let none = || format!("column {name}: no unit of {channel}; give one, as in --units {example}");
-                let unit = stated(example).or(own).ok_or_else(|| SelectionError::Other(none()))?;
-                let is_known = profile != ChannelProfile::generic(profile.name, profile.quantity);
-                match unit.base {
-                    COUNT if is_known => (Some(unit), profile.lsb),
-                    COUNT => {
-                        let told = format!("column {name}: counts of which sensor? give its profile with --sensor");
-                        return Err(SelectionError::Other(told));
-                    }
-                    _ => (Some(unit), unit.factor),
-                }
+            Role::Channel(channel) => {
+                let (name, example) = (&column.name, channel.unit);
+                let none = || format!("column {name}: no unit of {}; give one, as in --units {example}", channel.name);
+                let own = || column.unit_of_file(channel).or_else(|| stated(COUNT)).or_else(|| column.unit_of(channel));
+                let unit = stated(example).or_else(own).ok_or_else(|| SelectionError::Other(none()))?;
+                let told = || format!("column {name}: counts of which sensor? give its profile with --sensor");
+                let factor = if unit.base == COUNT { channel.lsb } else { Some(unit.factor) };
+                (Some(unit), factor.ok_or_else(|| SelectionError::Other(told()))?)
             }
         };
         Ok(ChosenColumn { position, role, label: column.name.clone(), unit, factor })
@@ -331,17 +312,17 @@ impl ColumnSelection {
 
 /// The recording as the user states it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ReadOptions {
-    pub sensor: SensorProfile,
+pub struct RowOptions {
+    pub sensor: SensorChannels,
     /// Columns and units.
     pub selection: ColumnSelection,
     pub topic: Option<String>,
 }
 
-impl ReadOptions {
+impl RowOptions {
     /// Defaults for `sensor`.
     #[must_use]
-    pub fn of_sensor(sensor: SensorProfile) -> Self {
+    pub fn of_sensor(sensor: SensorChannels) -> Self {
         Self { sensor, selection: ColumnSelection::default(), topic: None }
     }
 
@@ -370,7 +351,7 @@ impl AvailableColumn {
                 return Self { name: name.trim().to_owned(), unit: Some(unit) };
             }
         }
-        if let Some(unit) = Unit::parse(heading).filter(|unit| unit.base == SECOND && heading.len() > 1) {
+        if let Some(unit) = time_unit(heading) {
             return Self { name: heading.to_owned(), unit: Some(unit) };
         }
         // The longest ending that is a unit: `deg_s`, not `s`.
@@ -378,8 +359,10 @@ impl AvailableColumn {
         let named = ends.filter(|at| *at > 0).find_map(|at| {
             Unit::parse(&heading[at + 1..]).map(|unit| Self { name: heading[..at].to_owned(), unit: Some(unit) })
         });
+        // A channel's `_min` is its least value.
+        let is_of_channel = |column: &Self| matches!(role_of(&column.name), Some(NamedRole::Channel(_)));
         named
-            .filter(|column| role_of(&column.name).is_some())
+            .filter(|column| role_of(&column.name).is_some() && !(column.is_in_time() && is_of_channel(column)))
             .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
     }
 
@@ -399,16 +382,25 @@ impl AvailableColumn {
     }
 
     /// The channel of `sensor` by name.
-    fn channel(&self, sensor: &SensorProfile) -> Option<ChannelProfile> {
+    fn channel(&self, sensor: &SensorChannels) -> Option<SensorChannel> {
         match role_of(&self.name)? {
             NamedRole::Channel(name) => sensor.channel(name),
             NamedRole::Time | NamedRole::Index => None,
         }
     }
 
-    /// True if its unit suits the channel.
-    fn may_measure(&self, profile: &ChannelProfile) -> bool {
-        self.unit.is_none_or(|unit| unit.measures(profile.quantity) || unit.base == COUNT)
+    /// Its unit, if that suits the channel.
+    fn unit_of_file(&self, channel: SensorChannel) -> Option<Unit> {
+        self.unit.filter(|unit| unit.base == channel.unit || unit.base == COUNT)
+    }
+
+    /// The same, or that of its interface.
+    fn unit_of(&self, channel: SensorChannel) -> Option<Unit> {
+        self.unit_of_file(channel).or_else(|| unit_by_interface(&self.name, channel.unit))
+    }
+
+    fn is_in_time(&self) -> bool {
+        self.unit.is_some_and(|unit| unit.base == SECOND)
     }
 
     /// True for the name of a time.
@@ -451,6 +443,11 @@ fn listed(names: &[&str]) -> String {
     all.join(", ")
 }
 
+/// The unit that names a column of times; minutes are parts of a time.
+fn time_unit(heading: &str) -> Option<Unit> {
+    Unit::parse(heading).filter(|unit| unit.base == SECOND && unit.factor <= 1.0 && heading.len() > 1)
+}
+
 /// `G` of a magnetic field is gauss.
 fn gauss_of_field(name: &str, unit: &str) -> Option<Unit> {
     let is_field = matches!(role_of(name), Some(NamedRole::Channel(channel)) if channel.starts_with("magn"));
@@ -465,9 +462,9 @@ pub fn is_output_register(heading: &str) -> bool {
 }
 
 /// Unit in the industrial I/O interface of Linux, such as `in_anglvel_x`, without raw counts.
-fn unit_by_interface(name: &str, quantity: Quantity) -> Option<Unit> {
+fn unit_by_interface(name: &str, of_channel: &str) -> Option<Unit> {
     let plain = name.to_lowercase();
-    let unit = match quantity.unit() {
+    let unit = match of_channel {
         "deg/s" if plain.starts_with("in_anglvel_") => "rad/s",
         "g" if plain.starts_with("in_accel_") => "m/s^2",
         "gauss" if plain.starts_with("in_magn_") => "gauss",
@@ -478,11 +475,11 @@ fn unit_by_interface(name: &str, quantity: Quantity) -> Option<Unit> {
 
 /// Columns named as a channel of any sensor, `time` or `sample`, with positions; `None` if ambiguous.
 pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'static str, usize)>> {
-    let named = by_name(available, &SensorProfile::generic()).ok()?;
+    let named = by_name(available, &SensorChannels::generic()).ok()?;
     Some(named.into_iter().map(|(role, position)| (role.name(), position)).collect())
 }
 
-fn role_by_name(available: &[AvailableColumn], position: usize, sensor: &SensorProfile) -> Option<Role> {
+fn role_by_name(available: &[AvailableColumn], position: usize, sensor: &SensorChannels) -> Option<Role> {
     let name = &available[position].name;
     let by_name = || match role_of(&numbered_from_1(available, name).unwrap_or_else(|| name.clone()))? {
         NamedRole::Time => Some(Role::Time),
@@ -493,11 +490,11 @@ fn role_by_name(available: &[AvailableColumn], position: usize, sensor: &SensorP
     sensor.channel(name).map(Role::Channel).or_else(by_name).or_else(of_body)
 }
 
-fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<(Role, usize)>, SelectionError> {
+fn by_name(available: &[AvailableColumn], sensor: &SensorChannels) -> Result<Vec<(Role, usize)>, SelectionError> {
     let mut named: Vec<(Role, usize)> = Vec::new();
     for (position, column) in available.iter().enumerate() {
         let role = role_by_name(available, position, sensor).filter(|role| match role {
-            Role::Channel(profile) => column.may_measure(profile),
+            Role::Channel(channel) => column.unit.is_none() || column.unit_of_file(*channel).is_some(),
             Role::Time | Role::Index => true,
         });
         let Some(role) = role else { continue };
@@ -517,19 +514,19 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
         }
         named.push((role, position));
     }
-    for (axes, quantity) in AXES.into_iter().zip([Quantity::AngularRate, Quantity::SpecificForce]) {
-        if !named.iter().any(|(role, _)| matches!(role, Role::Channel(known) if known.quantity == quantity)) {
-            let profiles = axes.map(|name| sensor.channel(name));
-            let by_unit = axes_by_unit(available, quantity).into_iter().flatten().zip(profiles);
-            named.extend(by_unit.filter_map(|(at, profile)| Some((Role::Channel(profile?), at))));
+    for (axes, unit) in AXES.into_iter().zip(INERTIAL) {
+        if !named.iter().any(|(role, _)| matches!(role, Role::Channel(known) if known.unit == unit)) {
+            let channels = axes.map(|name| sensor.channel(name));
+            let by_unit = axes_by_unit(available, unit).into_iter().flatten().zip(channels);
+            named.extend(by_unit.filter_map(|(at, channel)| Some((Role::Channel(channel?), at))));
         }
     }
     Ok(named)
 }
 
-/// The only three columns in a unit of `quantity`, by the x, y and z at the end of their names.
-fn axes_by_unit(available: &[AvailableColumn], quantity: Quantity) -> Option<[usize; 3]> {
-    let of_unit = |column: &AvailableColumn| column.unit.is_some_and(|unit| unit.measures(quantity));
+/// The only three columns in a unit with this base, by the x, y and z at the end of their names.
+fn axes_by_unit(available: &[AvailableColumn], base: &str) -> Option<[usize; 3]> {
+    let of_unit = |column: &AvailableColumn| column.unit.is_some_and(|unit| unit.base == base);
     let own: Vec<usize> = (0..available.len()).filter(|at| of_unit(&available[*at])).collect();
     let axis = |letter: char| own.iter().copied().find(|at| available[*at].name.to_lowercase().ends_with(letter));
     Some([axis('x')?, axis('y')?, axis('z')?]).filter(|_| own.len() == 3)
@@ -563,7 +560,7 @@ const GYROSCOPE: &str = "gyro gy gyr gyros gyroscope gyro_rate gyrorate rot_rate
     angvel w wb g omega rate angular_velocity angular_rate w_rs_s gyro_rad anglvel angular_vel angularvel \
     angularrate ang_rate angrate rotrate rotation gyroadc gyroscope_rate";
 const ACCELEROMETER: &str = "accl ac fb acc accel accels accelerometer linearacceleration lin_acc linacc a acceleration \
-    linear_acceleration specific_force a_rs_s accelerometer_m_s2 force linear_accel linearaccel specificforce \
+    linear_acceleration specific_force gf a_rs_s accelerometer_m_s2 force linear_accel linearaccel specificforce \
     accsmooth accelerometer_acceleration";
 const MAGNETOMETER: &str = "magn mag magnetometer m mb b magnetic_field magneticfield mag_field magfield compass";
 const AXES: [[&str; 3]; 3] = [columns::GYROSCOPE, columns::ACCELEROMETER, columns::MAGNETOMETER];
@@ -588,9 +585,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
             return Some(NamedRole::Time);
         }
         // Named by its unit.
-        _ if plain.len() > 1 && Unit::parse(plain).is_some_and(|unit| unit.base == SECOND) => {
-            return Some(NamedRole::Time);
-        }
+        _ if time_unit(plain).is_some() => return Some(NamedRole::Time),
         _ if plain.ends_with("header_stamp") || plain.ends_with("timestamp") => return Some(NamedRole::Time),
         "sample" | "packet" | "packet_counter" | "packetcounter" | "packet_number" | "packetnumber"
         | "sample_number" | "samplenumber" | "sample_index" | "sample_counter" | "samplecounter" => {
@@ -622,7 +617,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
 #[cfg(test)]
 mod tests {
     use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
-    use measurement::SensorProfile;
+    use crate::columns::sensor::SensorChannels;
 
     fn chosen(headings: &[&str], columns: &[&str], units: &[&str]) -> Result<Vec<(String, f64)>, SelectionError> {
         let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
@@ -632,11 +627,11 @@ mod tests {
             let role = match column.role {
                 Role::Time => format!("time {}", column.unit.map_or("?", |unit| unit.name)),
                 Role::Index => "sample".to_owned(),
-                Role::Channel(profile) => profile.name.to_owned(),
+                Role::Channel(channel) => channel.name.to_owned(),
             };
             (format!("{role}={}", column.position), column.factor)
         };
-        Ok(selection.choose(&available, &SensorProfile::generic())?.into_iter().map(describe).collect())
+        Ok(selection.choose(&available, &SensorChannels::generic())?.into_iter().map(describe).collect())
     }
 
     #[test]
@@ -649,7 +644,7 @@ mod tests {
         ] {
             let columns: Vec<String> = columns.iter().map(|text| (*text).to_owned()).collect();
             let selection = ColumnSelection::parse(&columns, &[]).expect("columns");
-            let sensor = SensorProfile::generic();
+            let sensor = SensorChannels::generic();
             let chosen = selection.choose(&available, &sensor).expect("columns");
             assert_eq!(selection.notes(&available, &chosen, &sensor), [expected]);
         }
@@ -742,7 +737,7 @@ mod tests {
         let four = [&by_unit[..4], &["speed [rad/s]"]].concat();
         assert!(matches!(chosen(&four, &[], &[]), Err(SelectionError::NoChannel(_))));
         let available: Vec<AvailableColumn> = by_unit.iter().map(|text| AvailableColumn::from_heading(text)).collect();
-        let (selection, sensor) = (ColumnSelection::default(), SensorProfile::generic());
+        let (selection, sensor) = (ColumnSelection::default(), SensorChannels::generic());
         let chosen = selection.choose(&available, &sensor).expect("columns");
         let expected = "ω_x, ω_y, ω_z, fX, fY, fZ are axes of a sensor by their unit; --columns says otherwise";
         assert_eq!(selection.notes(&available, &chosen, &sensor), [expected]);
@@ -752,7 +747,7 @@ mod tests {
     fn every_column_is_used_or_named_as_left_out() {
         let headings = ["time_s", "gx [deg/s]", "gy [deg/s]", "gz [deg/s]", "temp", "my_rate_q", "m_x [V]", "note"];
         let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
-        let sensor = SensorProfile::generic();
+        let sensor = SensorChannels::generic();
         let selection = ColumnSelection::default();
         let chosen = selection.choose(&available, &sensor).expect("columns");
         let notes = selection.notes(&available, &chosen, &sensor);

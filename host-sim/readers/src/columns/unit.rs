@@ -1,7 +1,5 @@
 //! Units of columns and their factors to the units of the analysis.
 
-use measurement::Quantity;
-
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
 /// deg/s per rad/s.
@@ -49,6 +47,9 @@ const UNITS: &[(&[&str], &str, f64)] = &[
     (&["ms", "msec", "millis", "milliseconds"], SECOND, 1e-3),
     (&["us", "usec", "micros", "microseconds"], SECOND, 1e-6),
     (&["ns", "nsec", "nanos", "nanoseconds"], SECOND, 1e-9),
+    (&["min", "minutes"], SECOND, 60.0),
+    (&["h", "hr", "hours"], SECOND, 3600.0),
+    (&["days"], SECOND, 86_400.0),
     (&["counts", "count", "lsb", "raw"], COUNT, 1.0),
 ];
 
@@ -81,11 +82,6 @@ impl Unit {
     #[must_use]
     pub(crate) fn is_time(&self) -> bool {
         self.base == SECOND
-    }
-
-    #[must_use]
-    pub(crate) fn measures(&self, quantity: Quantity) -> bool {
-        self.base == quantity.unit()
     }
 }
 
@@ -124,6 +120,7 @@ mod tests {
             (&["µT", "uT"], "gauss", 0.01),
             (&["°C", "degC", "C"], "degC", 1.0),
             (&["us", "µs"], "s", 1e-6),
+            (&["min"], "s", 60.0),
             (&["counts", "LSB"], "count", 1.0),
             (&["deg/s/131", "deg/s / 131"], "deg/s", 1.0 / 131.0),
             (&["0.07*deg/s", "70*mdps", "0.07 * dps"], "deg/s", 0.07),

@@ -3,6 +3,7 @@
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::formats::message_layout::Scalar;
 use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
 use crate::input::budget::{Budget, Metered};
 use crate::input::file_bytes::FileBytes;
@@ -241,27 +242,9 @@ impl LogMessage<'_> {
 
     fn number_at(&self, position: usize) -> Option<Number> {
         let (_, kind, offset) = self.format.fields.get(position)?;
-        let (kind, bytes) = (*kind, self.bytes.get(*offset..)?);
-        let integer = match kind {
-            'b' => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-            'B' | 'M' => i64::from(*bytes.first()?),
-            'h' => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-            'H' => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-            'i' => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-            'I' => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-            'q' => i64::from_le_bytes(*bytes.first_chunk()?),
-            'Q' => i64::try_from(u64::from_le_bytes(*bytes.first_chunk()?)).ok()?,
-            'L' => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-            // Hundredths.
-            'C' => return Some(Number::Real(f64::from(u16::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
-            'e' => return Some(Number::Real(f64::from(i32::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
-            'E' => return Some(Number::Real(f64::from(u32::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
-            'c' => return Some(Number::Real(f64::from(i16::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
-            'f' => return Some(Number::Real(f64::from(f32::from_le_bytes(*bytes.first_chunk()?)))),
-            'd' => return Some(Number::Real(f64::from_le_bytes(*bytes.first_chunk()?))),
-            _ => return None,
-        };
-        Some(Number::Integer(integer))
+        let (scalar, divisor) = scalar(*kind)?;
+        let number = scalar.read(self.bytes.get(*offset..)?, false);
+        Some(if divisor == 1.0 { number } else { Number::Real(number.value() / divisor) })
     }
 
     fn integer(&self, label: &str) -> Option<i64> {
@@ -279,17 +262,37 @@ impl LogMessage<'_> {
     }
 }
 
-/// `None` for an unknown type.
-fn field_bytes(kind: char) -> Option<usize> {
+/// The encoding of a number, and its divisor; `None` for texts, arrays and unknown types.
+fn scalar(kind: char) -> Option<(Scalar, f64)> {
+    const HUNDREDTHS: f64 = 100.0;
     Some(match kind {
-        'b' | 'B' | 'M' => 1,
-        'h' | 'H' | 'c' | 'C' | 'g' => 2,
-        'i' | 'I' | 'e' | 'E' | 'f' | 'L' | 'n' => 4,
-        'q' | 'Q' | 'd' => 8,
-        'N' => 16,
-        'a' | 'Z' => 64,
+        'b' => (Scalar::Signed(1), 1.0),
+        'B' | 'M' => (Scalar::Unsigned(1), 1.0),
+        'h' => (Scalar::Signed(2), 1.0),
+        'H' => (Scalar::Unsigned(2), 1.0),
+        'c' => (Scalar::Signed(2), HUNDREDTHS),
+        'C' => (Scalar::Unsigned(2), HUNDREDTHS),
+        'i' | 'L' => (Scalar::Signed(4), 1.0),
+        'I' => (Scalar::Unsigned(4), 1.0),
+        'e' => (Scalar::Signed(4), HUNDREDTHS),
+        'E' => (Scalar::Unsigned(4), HUNDREDTHS),
+        'q' => (Scalar::Signed(8), 1.0),
+        'Q' => (Scalar::Unsigned(8), 1.0),
+        'g' => (Scalar::Float(2), 1.0),
+        'f' => (Scalar::Float(4), 1.0),
+        'd' => (Scalar::Float(8), 1.0),
         _ => return None,
     })
+}
+
+/// `None` for an unknown type.
+fn field_bytes(kind: char) -> Option<usize> {
+    match kind {
+        'n' => Some(4),
+        'N' => Some(16),
+        'a' | 'Z' => Some(64),
+        number => scalar(number).map(|(scalar, _)| scalar.bytes()),
+    }
 }
 
 struct Messages<R> {

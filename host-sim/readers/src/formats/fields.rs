@@ -137,7 +137,9 @@ pub(crate) fn number(field: &str) -> Option<Number> {
     {
         return Some(Number::Integer(integer));
     }
-    let real = field.parse().ok().or_else(|| field.replace(',', ".").replace(['D', 'd'], "e").parse().ok());
+    let of_comma = || field.replace(',', ".").parse().ok();
+    let of_signs = || field.replace(',', ".").replace(['D', 'd'], "e").replace('−', "-").parse().ok();
+    let real = field.parse().ok().or_else(of_comma).or_else(of_signs);
     let missing = || MISSING.contains(&field.to_lowercase().as_str()).then_some(f64::NAN);
     let inner = field.trim_matches(['[', ']', '(', ')', '{', '}', ';', '\'', ' ']);
     let inner = inner.strip_suffix('f').filter(|inner| inner.contains('.')).unwrap_or(inner);

@@ -1,6 +1,7 @@
 //! Recognition of a format by content, and reading.
 
-use crate::columns::column_selection::{ColumnSelection, ReadOptions};
+use crate::columns::column_selection::{ColumnSelection, RowOptions};
+use crate::columns::sensor::SensorChannels;
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
 #[cfg(feature = "hdf5")]
 use crate::formats::hdf5::Hdf5Reader;
@@ -30,7 +31,6 @@ use crate::inspection::InspectedTable;
 use crate::rows::batch::RegisterField;
 use crate::rows::row_source::{FileRows, RowSource};
 use crate::rows::whole_table::WholeTable;
-use measurement::SensorProfile;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -240,7 +240,7 @@ impl InputFile {
     /// The file is damaged, or its topic or columns cannot be chosen.
     pub fn rows(
         &self,
-        options: &ReadOptions,
+        options: &RowOptions,
         register: &dyn Fn(&str) -> Option<RegisterField>,
     ) -> Result<FileRows<'_>, InputError> {
         let (name, bytes) = (self.name(), self.bytes());
@@ -260,7 +260,7 @@ impl InputFile {
         &self,
         topic: Option<&str>,
         selection: &ColumnSelection,
-        sensor: &dyn Fn(&[&str]) -> SensorProfile,
+        sensor: &dyn Fn(&[&str]) -> SensorChannels,
     ) -> Result<Vec<InspectedTable>, InputError> {
         let name = self.name();
         let whole = match self.format {
@@ -284,7 +284,7 @@ impl InputFile {
         Ok(whole?.into_iter().map(inspect).collect())
     }
 
-    /// Sensors of one kind for [`ReadOptions::topic`]; empty for one sensor, unknown ones, or text.
+    /// Sensors of one kind for [`RowOptions::topic`]; empty for one sensor, unknown ones, or text.
     ///
     /// # Errors
     /// The file is damaged.

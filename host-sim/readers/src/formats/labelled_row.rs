@@ -15,7 +15,9 @@ pub(crate) fn parse(line: &str) -> Option<Record> {
         add(&object, "", &mut found);
         return (!found.is_empty()).then_some(found);
     }
-    pairs(line).filter(|found| found.len() > 1)
+    // `IMU {t : 5, gx : 0.1}` behind a log's time.
+    let inner = line.strip_suffix('}').and_then(|line| line.split_once('{')).map_or(line, |(_, inner)| inner);
+    pairs(inner).filter(|found| found.len() > 1)
 }
 
 /// The pairs of a line of text, perhaps none; `None` for another line.
@@ -70,6 +72,7 @@ mod tests {
             ("gx: 0.01, gy: -0.02", "gx=0.01 gy=-0.02"),
             ("t=12 Gyro X=0.5 Y=1e-3", "t=12 Gyro X=0.5 Gyro Y=1e-3"),
             ("I (90) imu: ax=0.1 ay=-1", "ax=0.1 ay=-1"),
+            ("10:00:13.5: IMU {TimeUS : 5, GyrX : -0.1}", "TimeUS=5 GyrX=-0.1"),
             (">gx:1,gy:2", "gx=1 gy=2"),
             ("time: 10:00:13.5\tax: 1 g\tay: 2 g", "time=10:00:13.5 ax=1 ay=2"),
             (r#"{"t": 5, "gyro": [0.1, 2], "imu": {"ax": null}}"#, "gyro.0=0.1 gyro.1=2 imu.ax= t=5"),

@@ -84,12 +84,12 @@ impl ArrayReader for &MemoryTable {
 #[cfg(test)]
 mod tests {
     use super::{MemoryArray, MemoryColumn, MemoryTable, ROWS_AT_ONCE};
-    use crate::columns::column_selection::ReadOptions;
+    use crate::columns::column_selection::RowOptions;
+    use crate::columns::sensor::SensorChannels;
     use crate::formats::file_format::InputFile;
     use crate::input::read_monitor::ReadMonitor;
     use crate::rows::batch::Number;
     use crate::rows::row_source::WantedRows;
-    use measurement::SensorProfile;
     use std::path::Path;
     use std::sync::Arc;
 
@@ -117,9 +117,9 @@ mod tests {
         let time = MemoryArray { name: "time".to_owned(), unit: Some("s".to_owned()), columns: vec![column(0.0)] };
         let table = MemoryTable { arrays: vec![time, gyro] };
         let file = InputFile::of_arrays(Path::new("arrays"), Arc::new(table), &ReadMonitor::default());
-        let options = ReadOptions::of_sensor(SensorProfile::generic());
+        let options = RowOptions::of_sensor(SensorChannels::generic());
         let mut reader = file.rows(&options, &|_| None).expect("columns by name");
-        let names: Vec<&str> = reader.columns().iter().map(|column| column.profile.name).collect();
+        let names: Vec<&str> = reader.columns().iter().map(|column| column.channel.name).collect();
         assert_eq!(names, ["gyro_x", "gyro_y", "gyro_z"]);
         let (mut times, mut last) = (Vec::new(), Vec::new());
         let read = reader.read(WantedRows::all(None), &mut |batch| {

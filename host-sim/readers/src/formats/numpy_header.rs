@@ -3,6 +3,7 @@
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::too_deep;
 use crate::input::input_error::Reason;
+use serde_json::Value;
 use std::io::Read;
 
 const FORMAT: &str = "NumPy array";
@@ -53,20 +54,14 @@ impl Header {
         // Latin-1 before version 3.
         let text =
             String::from_utf8(text).unwrap_or_else(|error| error.into_bytes().into_iter().map(char::from).collect());
-        let literal = Parser { rest: text.trim_start(), depth: 0 }.literal()?;
-        let Literal::Dict(entries) = literal else { return Err(damaged("its header is no dictionary")) };
-        let entry = |name: &str| entries.iter().find(|(key, _)| key == name).map(|(_, value)| value);
-        let (Some(descr), Some(Literal::Bool(is_fortran_order)), Some(Literal::List(shape))) =
-            (entry("descr"), entry("fortran_order"), entry("shape"))
+        let header: Value = serde_json::from_str(&json(&text)?).map_err(|_| damaged("its header is no literal"))?;
+        let (Some(is_fortran_order), Some(shape)) = (header["fortran_order"].as_bool(), header["shape"].as_array())
         else {
             return Err(damaged("its header lacks descr, fortran_order or shape"));
         };
-        let length = |of: &Literal| match of {
-            Literal::Number(number) => Ok(*number),
-            _ => Err(damaged("its shape is none")),
-        };
-        let shape = shape.iter().map(length).collect::<Result<_, _>>()?;
-        Ok(Self { element: element(descr)?, is_fortran_order: *is_fortran_order, shape })
+        let shape: Option<Vec<u64>> = shape.iter().map(Value::as_u64).collect();
+        let shape = shape.ok_or_else(|| damaged("its shape is none"))?;
+        Ok(Self { element: element(&header["descr"])?, is_fortran_order, shape })
     }
 }
 
@@ -78,32 +73,25 @@ fn fill(input: &mut impl Read, bytes: &mut [u8]) -> Result<(), Reason> {
     input.read_exact(bytes).map_err(|error| Reason::ended(FORMAT, error))
 }
 
-fn element(descr: &Literal) -> Result<ElementType, Reason> {
+fn element(descr: &Value) -> Result<ElementType, Reason> {
     match descr {
-        Literal::Text(text) => encoding(text).map(ElementType::Plain),
-        Literal::List(fields) => {
+        Value::String(text) => encoding(text).map(ElementType::Plain),
+        Value::Array(fields) => {
             let fields = fields.iter().map(|field| {
-                let Literal::List(field) = field else { return Err(damaged("a field has no name")) };
-                let (name, inner, shape) = match field.as_slice() {
-                    [name, inner] => (name, inner, &[][..]),
-                    [name, inner, Literal::List(shape)] => (name, inner, shape.as_slice()),
+                let (name, inner, shape) = match field.as_array().map(Vec::as_slice) {
+                    Some([name, inner]) => (name, inner, &[][..]),
+                    Some([name, inner, Value::Array(shape)]) => (name, inner, shape.as_slice()),
                     _ => return Err(damaged("a field is none")),
                 };
                 // A title may come first.
-                let name = match name {
-                    Literal::Text(name) => name,
-                    Literal::List(names) => match names.as_slice() {
-                        [.., Literal::Text(name)] => name,
-                        _ => return Err(damaged("a field has no name")),
-                    },
-                    _ => return Err(damaged("a field has no name")),
-                };
+                let name = name.as_array().and_then(|names| names.last()).unwrap_or(name);
+                let name = name.as_str().ok_or_else(|| damaged("a field has no name"))?;
                 let mut of_field = element(inner)?;
                 for length in shape.iter().rev() {
-                    let Literal::Number(length) = length else { return Err(damaged("the shape of a field is none")) };
-                    of_field = ElementType::Array(*length, Box::new(of_field));
+                    let length = length.as_u64().ok_or_else(|| damaged("the shape of a field is none"))?;
+                    of_field = ElementType::Array(length, Box::new(of_field));
                 }
-                Ok((name.clone(), of_field))
+                Ok((name.to_owned(), of_field))
             });
             fields.collect::<Result<_, _>>().map(ElementType::Record)
         }
@@ -142,98 +130,41 @@ impl Encoding {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
-enum Literal {
-    Text(String),
-    Number(u64),
-    Bool(bool),
-    List(Vec<Literal>),
-    Dict(Vec<(String, Literal)>),
-}
-
-struct Parser<'a> {
-    rest: &'a str,
-    depth: usize,
-}
-
-impl Parser<'_> {
-    fn literal(&mut self) -> Result<Literal, Reason> {
-        self.rest = self.rest.trim_start();
-        match self.rest.chars().next() {
-            Some('{') => self.entries(),
-            Some('(') => self.items(')'),
-            Some('[') => self.items(']'),
-            Some(quote @ ('\'' | '"')) => {
-                let (text, rest) = self.rest[1..].split_once(quote).ok_or_else(|| damaged("a text does not end"))?;
-                self.rest = rest;
-                Ok(Literal::Text(text.to_owned()))
+/// The literal as JSON: other brackets and quotation marks, no comma before a bracket, `true` for `True`, 3 for Python 2's `3L`.
+fn json(literal: &str) -> Result<String, Reason> {
+    let mut json = String::with_capacity(literal.len());
+    let (mut quote, mut depth) = (None, 0);
+    for letter in literal.chars() {
+        match (quote, letter) {
+            (Some(mark), letter) if letter == mark => {
+                quote = None;
+                json.push('"');
             }
-            Some(digit) if digit.is_ascii_digit() => {
-                let end = self.rest.find(|letter: char| !letter.is_ascii_digit()).unwrap_or(self.rest.len());
-                let (number, rest) = self.rest.split_at(end);
-                // Python 2 wrote 3L.
-                self.rest = rest.strip_prefix('L').unwrap_or(rest);
-                number.parse().map(Literal::Number).map_err(|_| damaged("a number is too large"))
+            (Some(_), letter) => {
+                json.extend(Some('\\').filter(|_| ['"', '\\'].contains(&letter)));
+                json.push(letter);
             }
-            _ => {
-                let words = [("True", true), ("False", false)];
-                let word = words.into_iter().find_map(|(word, value)| Some((self.rest.strip_prefix(word)?, value)));
-                let (rest, value) = word.ok_or_else(|| damaged("its header is no literal"))?;
-                self.rest = rest;
-                Ok(Literal::Bool(value))
+            (None, '\'' | '"') => {
+                quote = Some(letter);
+                json.push('"');
             }
+            (None, '(' | '[' | '{') => {
+                depth += 1;
+                if depth > MOST_BRACKETS {
+                    return Err(too_deep(MOST_BRACKETS));
+                }
+                json.push(if letter == '(' { '[' } else { letter });
+            }
+            (None, ')' | ']' | '}') => {
+                depth = depth.saturating_sub(1);
+                json.truncate(json.trim_end_matches([',', ' ']).len());
+                json.push(if letter == ')' { ']' } else { letter });
+            }
+            (None, 'L') => {}
+            (None, letter) => json.push(letter.to_ascii_lowercase()),
         }
     }
-
-    fn enter(&mut self) -> Result<(), Reason> {
-        self.depth += 1;
-        self.rest = &self.rest[1..];
-        if self.depth > MOST_BRACKETS { Err(too_deep(MOST_BRACKETS)) } else { Ok(()) }
-    }
-
-    fn leave(&mut self, end: char) -> bool {
-        self.rest = self.rest.trim_start();
-        let Some(rest) = self.rest.strip_prefix(end) else { return false };
-        self.rest = rest;
-        self.depth -= 1;
-        true
-    }
-
-    /// The last comma is optional.
-    fn take(&mut self, sign: char) -> bool {
-        self.rest = self.rest.trim_start();
-        let rest = self.rest.strip_prefix(sign);
-        self.rest = rest.unwrap_or(self.rest);
-        rest.is_some()
-    }
-
-    fn items(&mut self, end: char) -> Result<Literal, Reason> {
-        self.enter()?;
-        let mut items = Vec::new();
-        while !self.leave(end) {
-            items.push(self.literal()?);
-            if !self.take(',') && !self.rest.starts_with(end) {
-                return Err(damaged("a bracket does not end"));
-            }
-        }
-        Ok(Literal::List(items))
-    }
-
-    fn entries(&mut self) -> Result<Literal, Reason> {
-        self.enter()?;
-        let mut entries = Vec::new();
-        while !self.leave('}') {
-            let Literal::Text(key) = self.literal()? else { return Err(damaged("a key is no text")) };
-            if !self.take(':') {
-                return Err(damaged("a key has no value"));
-            }
-            entries.push((key, self.literal()?));
-            if !self.take(',') && !self.rest.starts_with('}') {
-                return Err(damaged("a bracket does not end"));
-            }
-        }
-        Ok(Literal::Dict(entries))
-    }
+    Ok(json)
 }
 
 #[cfg(test)]
@@ -262,6 +193,11 @@ mod tests {
         let names: Vec<&str> = fields.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["t", "gyro", "imu"]);
         assert!(matches!(&fields[1].1, ElementType::Array(3, inner) if matches!(**inner, ElementType::Plain(_))));
+        // Names with the signs of a literal, and Python 2.
+        let text = "{\"descr\": [('a) \\ \"b\", Labc', '<i2')], 'fortran_order': False, 'shape': (3L,), }";
+        let of_python_2 = header(text).expect("a record");
+        let ElementType::Record(fields) = of_python_2.element else { panic!("a record") };
+        assert_eq!((fields[0].0.as_str(), of_python_2.shape.as_slice()), ("a) \\ \"b\", Labc", &[3][..]));
         assert!(header("{'descr': '|O', 'fortran_order': False, 'shape': (), }").expect("an object").shape.is_empty());
     }
 

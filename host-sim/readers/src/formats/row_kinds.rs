@@ -8,7 +8,7 @@ use crate::input::input_error::Reason;
 const MOST_KINDS: usize = 8;
 const LEAST_ROWS: usize = 2;
 /// Columns that number devices, between blanks.
-const NUMBERED: &str = "id device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance \
+const NUMBERED: &str = "id i device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance \
     sensor_type sensortype type";
 const LEAST_NUMBERS: usize = 2;
 

@@ -1,6 +1,6 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ReadOptions, Role, SelectionError, as_they_are};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, RowOptions, SelectionError, as_they_are};
 use crate::columns::unit::{COUNT, Unit};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
 use crate::formats::fields::{leading_number, number, split, with_unit};
@@ -125,7 +125,7 @@ pub(crate) struct TextTable {
 }
 
 impl TextTable {
-    pub(crate) fn open(file: &FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &FileBytes, options: &RowOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let choose = |available: &[AvailableColumn]| options.choose(available);
         let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
         let columns_notes = options.selection.notes(&table.available, &table.chosen, &options.sensor);
@@ -351,27 +351,23 @@ impl TextTable {
     fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let zeros = self.lines.zero_bytes();
-        let of_zeros = (zeros > 0).then(|| format!("{zeros} bytes that are zero are left out"));
-        let mut notes: Vec<String> = self.columns_notes.iter().cloned().chain(of_rate).collect();
-        notes.extend(self.damaged.notes().chain(of_zeros));
-        let (name, damaged, others) = match &self.layout {
-            Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
+        let mut counted = vec![(zeros, format!("{zeros} bytes that are zero are left out"))];
+        let (others, what) = match &self.layout {
             Layout::Labelled { others, .. } => {
-                notes.push(format!("{others} lines without the names of the others are left out"));
-                return notes;
+                (others, "lines without the names of the others are left out".to_owned())
             }
             Layout::Columns { others, .. } => {
-                notes.push(format!("{others} rows of other kinds are left out; --topic reads another"));
-                return notes;
+                (others, "rows of other kinds are left out; --topic reads another".to_owned())
             }
-            Layout::Sentences { name, damaged, others } => (name, damaged, others),
+            Layout::Sentences { name, damaged, others } => {
+                let of_damaged = format!("{damaged} sentences whose checksum is wrong; their values are missing");
+                counted.push((*damaged, of_damaged));
+                (others, format!("lines that are no sentence {name} are left out; --topic reads another"))
+            }
         };
-        let sentences = [
-            (*damaged, format!("{damaged} sentences whose checksum is wrong; their values are missing")),
-            (*others, format!("{others} lines that are no sentence {name} are left out; --topic reads another")),
-        ];
-        notes.extend(sentences.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text));
-        notes
+        counted.push((*others, format!("{others} {what}")));
+        let counted = counted.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text);
+        self.columns_notes.iter().cloned().chain(of_rate).chain(self.damaged.notes()).chain(counted).collect()
     }
 
     fn fault(&self, line: u64, RowFault { column, reason }: RowFault) -> InputError {

@@ -1,6 +1,7 @@
 //! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, ReadOptions, as_they_are};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, RowOptions, as_they_are};
+use crate::columns::sensor::SensorChannels;
 use crate::columns::unit::Unit;
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
@@ -8,7 +9,6 @@ use crate::rows::batch::Number;
 pub(crate) use crate::rows::row_source::Ending;
 use crate::rows::row_source::{self, Refusal, RowSource};
 use crate::rows::whole_table::{TopicSensor, WholeTable};
-use measurement::SensorProfile;
 use std::path::Path;
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,14 +26,14 @@ pub(crate) struct Topic {
 /// A source of rows: topic, group or array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopicDescription {
-    /// For [`ReadOptions::topic`]; empty for all arrays.
+    /// For [`RowOptions::topic`]; empty for all arrays.
     pub name: String,
     /// Such as `sensor_msgs/Imu`; may be empty.
     pub kind: String,
     pub rows: Option<u64>,
     /// With units, if stated; empty if not decodable.
     pub columns: Vec<(String, Option<&'static str>)>,
-    /// Read without options, for [`ReadOptions::topic`].
+    /// Read without options, for [`RowOptions::topic`].
     pub sensors: Vec<String>,
 }
 
@@ -159,7 +159,7 @@ fn shape(topic: &Topic, sensor: Option<usize>) -> Vec<&'static str> {
     sensor.map_or_else(Vec::new, |at| topic.sensors[at].columns.iter().map(|(channel, ..)| *channel).collect())
 }
 
-fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> {
+fn choose(source: &dyn Source, options: &RowOptions) -> Result<Choice, Reason> {
     let (topics, format) = (source.topics(), source.offer().format);
     let known = sensors(topics);
     let names = |of: &[(String, Choice)]| of.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
@@ -226,7 +226,7 @@ fn describe(topics: &[Topic]) -> String {
 fn choose_columns(
     topic: &Topic,
     sensor: Option<&TopicSensor>,
-    options: &ReadOptions,
+    options: &RowOptions,
 ) -> Result<Vec<ChosenColumn>, Reason> {
     let refused = |error| Reason::Selection(Box::new(error));
     let Some(sensor) = sensor.filter(|_| !options.selection.has_columns()) else {
@@ -266,7 +266,7 @@ impl<'a> TopicRows<'a> {
     pub(crate) fn open(
         file: &'a Path,
         source: Box<dyn Source + 'a>,
-        options: &ReadOptions,
+        options: &RowOptions,
         limits: FileLimits,
     ) -> Result<Self, InputError> {
         let fail = |reason| InputError::file(file, reason);
@@ -363,7 +363,7 @@ pub(crate) fn read_whole<'a>(
     let topics: Vec<usize> = match (topic, source.offer().whole) {
         (Some(wanted), _) => {
             let selection = ColumnSelection::default();
-            let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: Some(wanted.to_owned()) };
+            let options = RowOptions { sensor: SensorChannels::generic(), selection, topic: Some(wanted.to_owned()) };
             vec![choose(source.as_ref(), &options).map_err(|reason| InputError::file(file, reason))?.topic]
         }
         (None, Some(whole)) => vec![whole],

@@ -18,23 +18,25 @@ const FORMAT: &str = "PX4 ULog";
 const HEADER_BYTES: u64 = 16;
 const FIFO_SAMPLES: usize = 32;
 const TIME_UNIT: &str = "us";
-const GYROSCOPE_UNIT: &str = "rad/s";
-const ACCELEROMETER_UNIT: &str = "m/s^2";
 
+/// Channels and unit.
+type Vector = ([&'static str; 3], &'static str);
+const RATE: Vector = (GYROSCOPE, "rad/s");
+const FORCE: Vector = (ACCELEROMETER, "m/s^2");
 type Axes = ([&'static str; 3], Vector);
 const XYZ: [&str; 3] = ["x", "y", "z"];
 const SENSORS: [(&str, &[Axes]); 3] = [
-    ("sensor_gyro", &[(XYZ, Vector::Rate)]),
+    ("sensor_gyro", &[(XYZ, RATE)]),
     (
         "sensor_combined",
         &[
-            (["gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]"], Vector::Rate),
-            (["accelerometer_m_s2[0]", "accelerometer_m_s2[1]", "accelerometer_m_s2[2]"], Vector::Force),
+            (["gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]"], RATE),
+            (["accelerometer_m_s2[0]", "accelerometer_m_s2[1]", "accelerometer_m_s2[2]"], FORCE),
         ],
     ),
-    ("sensor_accel", &[(XYZ, Vector::Force)]),
+    ("sensor_accel", &[(XYZ, FORCE)]),
 ];
-const FIFOS: [(&str, Vector); 2] = [("sensor_gyro_fifo", Vector::Rate), ("sensor_accel_fifo", Vector::Force)];
+const FIFOS: [(&str, Vector); 2] = [("sensor_gyro_fifo", RATE), ("sensor_accel_fifo", FORCE)];
 /// Published with the same times.
 const PAIRS: [[&str; 2]; 2] = [["sensor_gyro_fifo", "sensor_accel_fifo"], ["sensor_gyro", "sensor_accel"]];
 
@@ -42,21 +44,6 @@ const PAIRS: [[&str; 2]; 2] = [["sensor_gyro_fifo", "sensor_accel_fifo"], ["sens
 const MOST_WAITING: usize = 1024;
 /// Least share of common times.
 const MIN_PAIRED: f64 = 0.9;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Vector {
-    Rate,
-    Force,
-}
-
-impl Vector {
-    fn add_to(self, sensor: &mut TopicSensor, positions: [usize; 3]) {
-        match self {
-            Self::Rate => sensor.add_axes(GYROSCOPE, positions, GYROSCOPE_UNIT),
-            Self::Force => sensor.add_axes(ACCELEROMETER, positions, ACCELEROMETER_UNIT),
-        }
-    }
-}
 
 type Key = (String, u8);
 
@@ -174,7 +161,7 @@ impl<'a> UlogSource<'a> {
         if let Some((_, vector)) = FIFOS.iter().find(|(fifo, _)| fifo == name) {
             let columns = sample_columns(&XYZ);
             let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
-            vector.add_to(&mut sensor, [1, 2, 3]);
+            sensor.add_axes(vector.0, [1, 2, 3], vector.1);
             self.offer.topics.push(Topic { columns, sensors: vec![sensor], ..topic });
             self.rows.push(Rows::Fifo(key.clone()));
             return;
@@ -193,7 +180,7 @@ impl<'a> UlogSource<'a> {
         for (axes, vector) in SENSORS.iter().find(|(known, _)| known == name).map_or(&[][..], |(_, axes)| axes) {
             let [x, y, z] = axes.map(|axis| columns.iter().position(|column| column.name == axis));
             if let (Some(x), Some(y), Some(z)) = (x, y, z) {
-                vector.add_to(&mut sensor, [x, y, z]);
+                sensor.add_axes(vector.0, [x, y, z], vector.1);
             }
         }
         let sensors = Some(sensor).filter(|sensor| sensor.columns.len() > 1).into_iter().collect();
@@ -204,8 +191,8 @@ impl<'a> UlogSource<'a> {
     fn add_pair(&mut self, pair: [&'static str; 2], instance: u8, rows: u64) {
         let columns = sample_columns(&[GYROSCOPE, ACCELEROMETER].concat());
         let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
-        Vector::Rate.add_to(&mut sensor, [1, 2, 3]);
-        Vector::Force.add_to(&mut sensor, [4, 5, 6]);
+        sensor.add_axes(GYROSCOPE, [1, 2, 3], RATE.1);
+        sensor.add_axes(ACCELEROMETER, [4, 5, 6], FORCE.1);
         let (name, kind, rows) = (pair_name(pair, instance), pair.join("+"), Some(rows));
         self.offer.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor], ..Topic::default() });
         self.rows.push(Rows::Pair(pair, instance));

@@ -288,7 +288,7 @@ fn read_failure(error: io::Error) -> Reason {
 /// Without blanks and quotation marks of either kind.
 pub fn field(raw: &str) -> &str {
     // Mostly neither.
-    let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && !b"\"'".contains(byte));
+    let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && !matches!(byte, b'"' | b'\''));
     if is_bare(raw.as_bytes().first()) && is_bare(raw.as_bytes().last()) {
         return raw;
     }

@@ -29,12 +29,6 @@ pub(crate) struct RowTimes {
     pub(crate) backwards: usize,
 }
 
-impl RowTimes {
-    pub(crate) fn duration_s(&self) -> f64 {
-        self.seconds.last().copied().unwrap_or(0.0)
-    }
-}
-
 fn mean(values: &[f64]) -> f64 {
     let finite = || values.iter().filter(|value| value.is_finite());
     finite().sum::<f64>() / finite().count() as f64

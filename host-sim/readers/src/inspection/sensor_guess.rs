@@ -1,13 +1,13 @@
 //! Inertial columns by format, names or numbers.
 
 use crate::columns::column_selection::{AvailableColumn, ColumnSelection, known_by_name};
+use crate::columns::sensor::SensorChannels;
 use crate::columns::unit::{COUNT, SECOND, Unit};
 use crate::columns::{ACCELEROMETER, GYROSCOPE};
 use crate::inspection::column_facts::{ColumnFacts, time_unit};
 use crate::inspection::unit_guess::{self, UnitGuess};
 use crate::rows::batch::usual_unit;
 use crate::rows::whole_table::{TopicSensor, WholeTable};
-use measurement::SensorProfile;
 use std::collections::BTreeMap;
 use time_base::TimeRange;
 
@@ -85,7 +85,7 @@ impl SensorGuess {
     pub(crate) fn all(
         table: &WholeTable,
         facts: &[ColumnFacts],
-        profile: &SensorProfile,
+        profile: &SensorChannels,
         selection: &ColumnSelection,
     ) -> Vec<Self> {
         let mut found: Vec<Self> = Self::by_user(facts, selection).into_iter().collect();
@@ -166,7 +166,10 @@ impl SensorGuess {
     fn clock(facts: &[ColumnFacts]) -> Option<(usize, &'static str)> {
         let named = facts.iter().position(|of| of.column.is_time()).map(|at| (at, ""));
         let is_clock = |at: &usize| facts[*at].is_clock() && !facts[*at].is_counter();
-        named.or_else(|| (0..facts.len()).find(is_clock).map(|at| (at, "it grows evenly")))
+        let is_called = |at: &usize| facts[*at].column.name.to_lowercase().contains("time");
+        let clocks: Vec<usize> = if named.is_none() { (0..facts.len()).filter(is_clock).collect() } else { Vec::new() };
+        let clock = clocks.iter().copied().find(is_called).or(clocks.first().copied());
+        named.or(clock.map(|at| (at, "it grows evenly")))
     }
 
     fn add_clock(&mut self, facts: &[ColumnFacts]) {
@@ -227,17 +230,14 @@ impl SensorGuess {
     }
 
     /// Adds units that the file lacks.
-    fn with_units(mut self, facts: &[ColumnFacts], profile: &SensorProfile, selection: &ColumnSelection) -> Self {
-        let any = SensorProfile::generic();
+    fn with_units(mut self, facts: &[ColumnFacts], profile: &SensorChannels, selection: &ColumnSelection) -> Self {
+        let any = SensorChannels::generic();
         for (channel, _, unit, _) in &mut self.columns {
-            let base = any.channel(channel).map_or(SECOND, |of| of.quantity.unit());
+            let base = any.channel(channel).map_or(SECOND, |of| of.unit);
             *unit = selection.stated_unit(base).or(*unit);
-            // By the profile.
             if unit.is_some_and(|unit| unit.base == COUNT) {
-                *unit = profile
-                    .channel(channel)
-                    .filter(|of| of.lsb != 1.0)
-                    .and_then(|of| Some(Unit { factor: of.lsb, ..Unit::parse(of.quantity.unit())? }));
+                let known = profile.channel(channel);
+                *unit = known.and_then(|of| Some(Unit { factor: of.lsb?, ..Unit::parse(of.unit)? }));
             }
         }
         let lacks_unit = |channels: [&str; 3]| {
@@ -377,7 +377,9 @@ const OTHER_NAMES: &str = "lat lon alt easting northing quality yaw pitch roll h
 fn may_be_inertial(column: &AvailableColumn) -> bool {
     let name = column.name.to_lowercase();
     let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));
-    unit && !OTHER_NAMES.split(' ').any(|other| name.contains(other))
+    // `q0` and `qw` are a quaternion's.
+    let is_of_quaternion = name.len() == 2 && name.starts_with('q');
+    unit && !is_of_quaternion && !OTHER_NAMES.split(' ').any(|other| name.contains(other))
 }
 
 /// Over the longest.

@@ -1,11 +1,11 @@
 //! Batches of rows, column by column.
 
 use crate::columns::column_selection::{ChosenColumn, Role};
+use crate::columns::sensor::SensorChannel;
 use crate::columns::unit::{SECOND, Unit};
 use crate::columns::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::Reason;
-use measurement::ChannelProfile;
 use std::ops::Range;
 use time_base::{Order, ROWS_OF_FIRST, ROWS_OF_SET_CLOCK, StampOrder};
 
@@ -46,8 +46,8 @@ impl Number {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValueColumn {
     /// Its LSB is not that of the numbers.
-    pub profile: ChannelProfile,
-    /// For 1, in the profile's unit.
+    pub channel: SensorChannel,
+    /// For 1, in the channel's unit.
     pub factor: f64,
     pub label: String,
     pub register: Option<RegisterField>,
@@ -438,7 +438,7 @@ impl BatchBuilder {
 
 /// Positions of these channels, unless they are register words.
 fn axes(columns: &[ValueColumn], names: &[&str; 3]) -> Option<[usize; 3]> {
-    let position = |name: &str| columns.iter().position(|of| of.profile.name == name && of.register.is_none());
+    let position = |name: &str| columns.iter().position(|of| of.channel.name == name && of.register.is_none());
     Some([position(names[0])?, position(names[1])?, position(names[2])?])
 }
 

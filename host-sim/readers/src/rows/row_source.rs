@@ -189,11 +189,11 @@ impl<'a> FileRows<'a> {
         register: &dyn Fn(&str) -> Option<RegisterField>,
     ) -> Self {
         let column = |column: &ChosenColumn| match column.role {
-            Role::Channel(profile) => Some(ValueColumn {
-                profile,
+            Role::Channel(channel) => Some(ValueColumn {
+                channel,
                 factor: column.factor,
                 label: column.label.clone(),
-                register: register(profile.name),
+                register: register(channel.name),
             }),
             Role::Time | Role::Index => None,
         };

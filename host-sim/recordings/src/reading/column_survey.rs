@@ -1,10 +1,10 @@
 //! Numbers of a column before they become counts.
 
-use crate::batch_source::channel;
+use crate::batch_source::{ProfiledColumn, channel};
 use crate::recording::Verdict;
 use adis16405_driver::{Channel, Faults};
 use measurement::ChannelProfile;
-use readers::{ColumnQuantizer, ValueColumn};
+use readers::ColumnQuantizer;
 use std::collections::BTreeMap;
 
 /// Factor on a data sheet's range of plausible values.
@@ -19,13 +19,13 @@ const NOTED_COST: f64 = 1e-3;
 const RUN: usize = 64;
 const MOST_KEPT: usize = 1 << 17;
 
-pub(crate) fn refusal(column: &ValueColumn, value: f64, verdict: Option<&Verdict>) -> Option<&'static str> {
+pub(crate) fn refusal(column: &ProfiledColumn, value: f64, verdict: Option<&Verdict>) -> Option<&'static str> {
     if value.is_nan() {
         return Some("missing");
     }
     match verdict.filter(|_| column.register.is_some()) {
         Some(verdict) if verdict.refused.is_empty() => None,
-        Some(verdict) => refusal_of_register(channel(column)?, value, *verdict),
+        Some(verdict) => refusal_of_register(channel(column.register)?, value, *verdict),
         None if value.is_infinite() => Some("not_finite"),
         None if (value * column.factor).abs() > largest_value(&column.profile) => Some("out_of_range"),
         None => None,
@@ -76,7 +76,7 @@ impl ColumnSurvey {
     }
 
     /// Sets refused numbers to NaN.
-    pub(crate) fn add(&mut self, column: &ValueColumn, values: &mut [f64], verdicts: &[Verdict]) {
+    pub(crate) fn add(&mut self, column: &ProfiledColumn, values: &mut [f64], verdicts: &[Verdict]) {
         for (row, value) in values.iter_mut().enumerate() {
             if let Some(cause) = refusal(column, *value, verdicts.get(row)) {
                 *self.refused.entry(cause).or_insert(0) += 1;
@@ -127,7 +127,7 @@ impl ColumnSurvey {
         self.values.chunks(RUN).flat_map(run).collect()
     }
 
-    pub(crate) fn quantizer(&self, column: &ValueColumn) -> Option<ColumnQuantizer> {
+    pub(crate) fn quantizer(&self, column: &ProfiledColumn) -> Option<ColumnQuantizer> {
         let of_values =
             || if column.register.is_some() { ColumnQuantizer::COUNTS } else { ColumnQuantizer::new(&self.values()) };
         self.is_usable.then(of_values)

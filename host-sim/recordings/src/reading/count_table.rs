@@ -78,7 +78,7 @@ fn for_each_row_of(
     file: &FileBytes,
     mut take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
 ) -> Result<Option<String>, StreamError> {
-    let channels: Vec<Channel> = source.columns().iter().filter_map(channel).collect();
+    let channels: Vec<Channel> = source.columns().iter().filter_map(|column| channel(column.register)).collect();
     let mut rows = 0u64;
     let read = for_each_batch(
         |give| source.read(wanted, give),

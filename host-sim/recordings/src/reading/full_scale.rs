@@ -1,6 +1,7 @@
 //! Counts rows with a channel at full scale by the data sheet, else at 16 bits if reached but not exceeded.
 
-use readers::{ColumnQuantizer, ValueColumn};
+use crate::batch_source::ProfiledColumn;
+use readers::ColumnQuantizer;
 use std::collections::BTreeMap;
 
 const MAX_16_BITS: i32 = i16::MAX as i32;
@@ -23,9 +24,9 @@ pub(crate) struct FullScale {
 }
 
 impl FullScale {
-    pub(crate) fn new(columns: &[ValueColumn]) -> Self {
+    pub(crate) fn new(columns: &[ProfiledColumn]) -> Self {
         let none = |value: f64| Extreme { value, first_row: 0, count: 0 };
-        let of_column = |column: &ValueColumn| {
+        let of_column = |column: &ProfiledColumn| {
             // Larger numbers are at full scale too.
             let range = column.profile.range.map(|range| range * (1.0 - HALF_COUNT) / column.factor);
             [none(range.unwrap_or(f64::NEG_INFINITY)), none(range.map_or(f64::INFINITY, |range| -range))]
@@ -34,7 +35,7 @@ impl FullScale {
     }
 
     /// Rows from `first` on, by column; refused numbers are NaN.
-    pub(crate) fn add_rows(&mut self, columns: &[ValueColumn], first_row: u64, values: &[Vec<f64>]) {
+    pub(crate) fn add_rows(&mut self, columns: &[ProfiledColumn], first_row: u64, values: &[Vec<f64>]) {
         let is_candidate = |(values, [most, least]): (&Vec<f64>, &[Extreme; 2])| {
             values.iter().any(|value| *value >= most.value || *value <= least.value)
         };
@@ -52,7 +53,7 @@ impl FullScale {
     }
 
     /// Refused numbers are NaN.
-    fn add(&mut self, columns: &[ValueColumn], row: u64, numbers: impl Iterator<Item = f64>) {
+    fn add(&mut self, columns: &[ProfiledColumn], row: u64, numbers: impl Iterator<Item = f64>) {
         let mut mask = 0u128;
         for (at, (number, column)) in numbers.zip(columns).take(MOST_COLUMNS).enumerate() {
             if !is_watched(column) {
@@ -81,7 +82,11 @@ impl FullScale {
     }
 
     /// Rows at full scale, and a note per channel.
-    pub(crate) fn finish(&self, columns: &[ValueColumn], quantizers: &[Option<ColumnQuantizer>]) -> (u64, Vec<String>) {
+    pub(crate) fn finish(
+        &self,
+        columns: &[ProfiledColumn],
+        quantizers: &[Option<ColumnQuantizer>],
+    ) -> (u64, Vec<String>) {
         let (mut mask, mut notes) = (0u128, Vec::new());
         for (at, (extremes, column)) in self.extremes.iter().zip(columns).enumerate() {
             let Some(quantizer) = &quantizers[at] else { continue };
@@ -110,7 +115,7 @@ impl FullScale {
 }
 
 /// Supply and temperature without a range are often constant.
-fn is_watched(column: &ValueColumn) -> bool {
+fn is_watched(column: &ProfiledColumn) -> bool {
     column.profile.range.is_some() || column.profile.quantity.is_inertial()
 }
 
@@ -127,12 +132,13 @@ fn forget(rows: &mut BTreeMap<u128, u64>, bit: u128) {
 #[cfg(test)]
 mod tests {
     use super::FullScale;
+    use crate::batch_source::ProfiledColumn;
     use measurement::{ChannelProfile, Quantity};
-    use readers::{ColumnQuantizer, ValueColumn};
+    use readers::ColumnQuantizer;
 
     fn found(range: Option<f64>, rows: &[[f64; 2]]) -> (u64, Vec<String>) {
         let profile = ChannelProfile { range, ..ChannelProfile::generic("gyro_x", Quantity::AngularRate) };
-        let column = ValueColumn { profile, factor: 1.0, label: String::new(), register: None };
+        let column = ProfiledColumn { profile, factor: 1.0, label: String::new(), register: None };
         let columns = [column.clone(), column];
         let mut scale = FullScale::new(&columns);
         for (row, numbers) in rows.iter().enumerate() {

@@ -3,8 +3,8 @@
 use crate::batch_source::for_each_batch;
 use crate::counts::count_table_writer::write_text;
 use crate::counts::numpy_matrix::{MatrixWriter, SiUnit};
-use crate::file_format::RecordedInput;
-use readers::{Batch, ReadOptions, RowsRead, StreamError, ValueColumn, WantedRows};
+use crate::file_format::{ReadOptions, RecordedInput};
+use readers::{Batch, RowsRead, StreamError, ValueColumn, WantedRows};
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
@@ -51,7 +51,7 @@ impl SensorRows<'_> {
                 if names.is_empty() {
                     let stamps = [("sample", !batch.indices.is_empty()), ("time_s", !batch.times.is_empty())];
                     names.extend(stamps.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()));
-                    names.extend(columns.iter().map(|of| format!("{} [{}]", of.profile.name, of.profile.unit)));
+                    names.extend(columns.iter().map(|of| format!("{} [{}]", of.channel.name, of.channel.unit)));
                     writeln!(out, "{}", names.join(","))?;
                 }
                 text.clear();
@@ -81,11 +81,11 @@ impl SensorRows<'_> {
     pub fn write_array(&self, file: &Path) -> Result<WrittenRows, WriteError> {
         let mut matrix = MatrixWriter::create(file)?;
         let written = self.for_each_batch(|columns, batch, names| {
-            let units: Vec<SiUnit> = columns.iter().map(|column| SiUnit::of(column.profile.unit)).collect();
+            let units: Vec<SiUnit> = columns.iter().map(|column| SiUnit::of(column.channel.unit)).collect();
             if names.is_empty() {
                 names.extend(Some("time_s".to_owned()).filter(|_| !batch.times.is_empty()));
                 let channels = columns.iter().zip(&units);
-                names.extend(channels.map(|(column, unit)| format!("{}_{}", column.profile.name, unit.suffix)));
+                names.extend(channels.map(|(column, unit)| format!("{}_{}", column.channel.name, unit.suffix)));
             }
             for row in 0..batch.rows {
                 let time = batch.times.get(row).copied();

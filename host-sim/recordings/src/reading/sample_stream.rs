@@ -1,7 +1,7 @@
 //! Samples on their time base, in batches, in bounded memory: a first reading finds rate, length and counts.
 
-use crate::batch_source::{BatchSource, RecordedRows};
-use crate::file_format::{RecordedInput, options_of_counts};
+use crate::batch_source::{BatchSource, ProfiledColumn, RecordedRows};
+use crate::file_format::{ReadOptions, RecordedInput, options_of_counts};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
 use crate::recording::{Recording, Verdict};
@@ -11,8 +11,8 @@ use measurement::{
     lost_part,
 };
 use readers::{
-    ACCELEROMETER, BATCH, ColumnQuantizer, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, ReadMonitor,
-    ReadOptions, ReadPass, RowBefore, Unpadded, ValueColumn, WantedRows,
+    ACCELEROMETER, BATCH, ColumnQuantizer, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, ReadMonitor, ReadPass,
+    RowBefore, Unpadded, WantedRows,
 };
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
@@ -424,7 +424,7 @@ impl Placer {
 }
 
 struct StreamedColumn {
-    column: ValueColumn,
+    column: ProfiledColumn,
     survey: ColumnSurvey,
     quantizer: Option<ColumnQuantizer>,
 }
@@ -487,7 +487,7 @@ impl Survey {
     ) -> Result<Self, StreamError> {
         monitor.begin_pass(ReadPass::FirstRows);
         let mut source = origin.open()?;
-        let columns: Vec<ValueColumn> = source.columns().to_vec();
+        let columns: Vec<ProfiledColumn> = source.columns().to_vec();
         let stated_hz = wanted.stated_hz.or(source.rate_hz());
         let mut placer = Placer::new(Clock::new(stated_hz)?, columns.len());
         let mut surveys = vec![ColumnSurvey::new(); columns.len()];
@@ -518,7 +518,7 @@ impl Survey {
         placer.place(None)?;
         let Placer { totals, clock, has_index, .. } = placer;
         let unfilled = never_filled(&columns, &surveys);
-        let quantizer = |(at, (survey, column)): (usize, (&ColumnSurvey, &ValueColumn))| {
+        let quantizer = |(at, (survey, column)): (usize, (&ColumnSurvey, &ProfiledColumn))| {
             survey.quantizer(column).filter(|_| !unfilled.contains(&at))
         };
         let quantizers: Vec<Option<ColumnQuantizer>> =
@@ -677,7 +677,7 @@ impl Survey {
 }
 
 /// All-zero vectors beside others: unfilled fields.
-fn never_filled(columns: &[ValueColumn], surveys: &[ColumnSurvey]) -> Vec<usize> {
+fn never_filled(columns: &[ProfiledColumn], surveys: &[ColumnSurvey]) -> Vec<usize> {
     let of_group = |group: &[&str; 3]| -> Vec<usize> {
         let is_own = |at: &usize| group.contains(&columns[*at].profile.name) && columns[*at].register.is_none();
         let own: Vec<usize> = (0..columns.len()).filter(is_own).collect();

@@ -195,7 +195,29 @@ fn rows_of_different_origin_are_several_sensors() {
 type WriteRow = fn(f64, [f64; 3]) -> String;
 
 /// Text before the rows, the rows, and text behind them.
-const ROWS_OF_PROGRAMS: [(&str, WriteRow, &str); 15] = [
+const ROWS_OF_PROGRAMS: [(&str, WriteRow, &str); 19] = [
+    (
+        "time_s,gx,gy,gz,note\n",
+        |t, [x, y, z]| format!("{t:.2},{x:.4},{y:.4},{z:.4},{:.3}\n", x - 1.5).replace('-', "\u{2212}"),
+        "",
+    ),
+    (
+        "Clock:Tick#,Clock:offsetTime,IMU(0):gyroX,IMU(0):gyroY,IMU(0):gyroZ\n",
+        |t, [x, y, z]| format!("{:.0},{t:.3},{x:.4},{y:.4},{z:.4}\n", 4.5e6 * t),
+        "",
+    ),
+    (
+        "Time (min),gx (deg/s),gy (deg/s),gz (deg/s),gx_min\n",
+        |t, [x, y, z]| format!("{:.8},{x:.4},{y:.4},{z:.4},0\n", t / 60.0),
+        "",
+    ),
+    (
+        "",
+        |t, [x, y, z]| {
+            format!("2024-05-13 10:00: IMU {{TimeUS : {:.0}, GyrX : {x:.4}, GyrY : {y:.4}, GyrZ : {z:.4}}}\n", 1e6 * t)
+        },
+        "",
+    ),
     ("time,gyro_x,gyro_y,gyro_z\n", |t, [x, y, z]| format!("{t:.2} s,{x:.4} deg/s,{y:.4}°/s,{z:.4} deg/s\n"), ""),
     (
         "time_s,gyro_x,gyro_y,gyro_z\n",
