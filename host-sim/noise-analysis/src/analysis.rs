@@ -138,7 +138,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         longest_at_rest: None,
         channels,
     };
-    figure_data::set(&mut report, measurement, record.first.as_ref());
+    figure_data::set(&mut report, record);
     report
 }
 

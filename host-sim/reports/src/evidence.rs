@@ -182,10 +182,10 @@ fn of_kind(effect: &Effect) -> String {
         ),
         Effect::WanderingLevel(of) => format!(
             "the deviation of neighbours' differences is like that some time before, by chance {}; its logarithm varies by {:.3} (1 σ) \
-             and forgets in {:.3} s; a vibration, a supply or a temperature that changes",
+             and forgets in {} s; a vibration, a supply or a temperature that changes",
             chance(of.p_value),
             of.deviation.value,
-            of.time_constant_s.value
+            significant(of.time_constant_s.value, 2)
         ),
         Effect::TemperatureSensitivity(of) => {
             format!("follows the measured temperature, {:.0} σ; a bias that drifts with temperature", of.sigmas)

@@ -4,6 +4,7 @@
 use crate::distributions::chi_squared_quantile;
 use crate::effects::BiasBlocks;
 use crate::parallel::in_parallel;
+use crate::record::condensed_record::CondensedRecord;
 use crate::report::{BiasOverTime, ChannelReport, DataSheetReport, FigureData, Report, SpectrumReport, TermReport};
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
@@ -28,12 +29,14 @@ const COARSE_SEGMENTS: usize = 64;
 const COARSE_FROM: f64 = 16.0;
 /// Lowest point of the finer spectrum that is used, for the same reason; what it changes there is below 10 % for a random walk.
 const FINE_FROM: f64 = 3.0;
+/// Part of the rate of means up to which their spectrum is shown.
+const OF_MEANS: f64 = 0.4;
 /// Significant digits: more than a figure resolves.
 const DIGITS: usize = 6;
 
-/// Sets the figure data of every channel of `report`, the report of `measurement`; where that has the means of a long record, its
-/// `first` samples show the higher frequencies.
-pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<&Measurement>) {
+/// Sets the figure data of every channel of `report`, the report of `record`.
+pub(crate) fn set(report: &mut Report, record: &CondensedRecord) {
+    let measurement = record.means.as_ref();
     let period_s = report.sample_rate_hz.recip();
     let recorded: Vec<(ChannelId, &ChannelReport)> = measurement.ids().zip(&report.channels).collect();
     let mut data = in_parallel(&recorded, |&(id, channel)| {
@@ -46,12 +49,8 @@ pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<
                 let whole = Model::new(period_s, terms);
                 // Root of the one-sided density.
                 let model = |frequency: f64| (2.0 * whole.density(frequency)).sqrt();
-                let own = spectrum(&UniformSeries::from_series(&series), model);
-                let faster = first.and_then(|first| {
-                    let series = Series::from_measurement(first, first.named(profile.name)?);
-                    spectrum(&UniformSeries::from_series(&series), model)
-                });
-                with_faster(own, faster, measurement.sample_rate_hz)
+                let of_samples = record.spectrum_within(id, series.span.clone());
+                spectrum(&UniformSeries::from_series(&series), of_samples.as_ref(), model)
             },
             bias_over_time: bias_over_time(&series),
         }
@@ -79,8 +78,9 @@ pub(crate) fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
     })
 }
 
-/// The spectrum of `series` in bands of equal width on a logarithmic axis.
-fn spectrum(series: &UniformSeries, model: impl Fn(f64) -> f64) -> Option<SpectrumReport> {
+/// The spectrum of `series` in bands of equal width on a logarithmic axis. Of a series of means, the spectrum `of_samples` stands above
+/// four tenths of their rate, where they have lost a quarter of a sinusoid.
+fn spectrum(series: &UniformSeries, of_samples: Option<&Welch>, model: impl Fn(f64) -> f64) -> Option<SpectrumReport> {
     let length = |segments: usize| {
         let samples = series.values().len() / segments;
         samples.checked_ilog2().map(|log2| 1_usize << log2)
@@ -88,12 +88,15 @@ fn spectrum(series: &UniformSeries, model: impl Fn(f64) -> f64) -> Option<Spectr
     let fine = Welch::estimate(series, length(FINE_SEGMENTS)?)?;
     let coarse = length(COARSE_SEGMENTS).and_then(|length| Welch::estimate(series, length));
     let change = coarse.as_ref().map_or(f64::INFINITY, |coarse| COARSE_FROM * coarse.resolution());
-    let nyquist = 0.5 / series.sample_period();
+    let nyquist = 0.5 / of_samples.map_or(series.sample_period(), Welch::sample_period);
+    let limit = if of_samples.is_some() { OF_MEANS / series.sample_period() } else { nyquist };
     let first = FINE_FROM * fine.resolution();
     let ratio = (nyquist / first).max(1.0).powf(1.0 / BANDS as f64);
-    let low = bands(&fine, first..change.min(nyquist), ratio);
-    let high = coarse.as_ref().map(|coarse| bands(coarse, change..nyquist, ratio)).unwrap_or_default();
-    let mut points: Vec<SpectralPoint> = low.into_iter().chain(high).filter(|point| point.density > 0.0).collect();
+    let low = bands(&fine, first..change.min(limit), ratio);
+    let high = coarse.as_ref().map(|coarse| bands(coarse, change..limit, ratio)).unwrap_or_default();
+    let faster = of_samples.map(|welch| bands(welch, limit..nyquist, ratio)).unwrap_or_default();
+    let points = low.into_iter().chain(high).chain(faster);
+    let mut points: Vec<SpectralPoint> = points.filter(|point| point.density > 0.0).collect();
     keep_most(&mut points);
     let column =
         |of: &dyn Fn(&SpectralPoint) -> f64| points.iter().map(|point| rounded(of(point))).collect::<Vec<f64>>();
@@ -108,22 +111,6 @@ fn spectrum(series: &UniformSeries, model: impl Fn(f64) -> f64) -> Option<Spectr
         low: column(&|point| bound(point, 0.975)),
         high: column(&|point| bound(point, 0.025)),
         model: column(&|point| model(point.frequency)),
-    })
-}
-
-/// The spectrum of means at the rate `rate_hz`, and above four tenths of that rate, where means have lost a quarter of a sinusoid, that
-/// of samples.
-fn with_faster(means: Option<SpectrumReport>, faster: Option<SpectrumReport>, rate_hz: f64) -> Option<SpectrumReport> {
-    let (Some(means), Some(faster)) = (&means, &faster) else { return means.or(faster) };
-    let highest = means.frequency_hz.partition_point(|frequency| *frequency < 0.4 * rate_hz);
-    let lowest = faster.frequency_hz.partition_point(|frequency| *frequency < 0.4 * rate_hz);
-    let column = |of: &dyn Fn(&SpectrumReport) -> &Vec<f64>| [&of(means)[..highest], &of(faster)[lowest..]].concat();
-    Some(SpectrumReport {
-        frequency_hz: column(&|of| &of.frequency_hz),
-        density: column(&|of| &of.density),
-        low: column(&|of| &of.low),
-        high: column(&|of| &of.high),
-        model: column(&|of| &of.model),
     })
 }
 
@@ -288,7 +275,7 @@ mod tests {
     #[test]
     fn the_spectrum_of_white_noise_is_flat_and_inside_its_bounds() {
         let series = UniformSeries::new(PERIOD_S, white(200_000, 1));
-        let spectrum = spectrum(&series, |_| 1.0).expect("a spectrum");
+        let spectrum = spectrum(&series, None, |_| 1.0).expect("a spectrum");
         // One-sided: 2σ²·dt.
         let expected = (2.0 * PERIOD_S).sqrt();
         let count = spectrum.density.len();
@@ -304,7 +291,7 @@ mod tests {
         const FREQUENCY_HZ: f64 = 20.5;
         let line = |index: usize| 0.3 * (2.0 * PI * FREQUENCY_HZ * PERIOD_S * index as f64).sin();
         let values = white(200_000, 2).into_iter().enumerate().map(|(index, noise)| noise + line(index)).collect();
-        let spectrum = spectrum(&UniformSeries::new(PERIOD_S, values), |_| 1.0).expect("a spectrum");
+        let spectrum = spectrum(&UniformSeries::new(PERIOD_S, values), None, |_| 1.0).expect("a spectrum");
         let highest = (0..spectrum.density.len()).max_by(|&a, &b| spectrum.density[a].total_cmp(&spectrum.density[b]));
         let highest = highest.expect("a point");
         // Segments of 2048 samples resolve 0.05 Hz; the bands around are 0.5 Hz wide.

@@ -1,4 +1,4 @@
-//! Records of MCAP in the memory of one chunk. The crate `mcap` needs a C compiler.
+//! Records of MCAP in the memory of one chunk. The crate `mcap` unpacks chunks by libraries in C.
 
 use crate::formats::topics::Stop;
 use crate::input::budget::{Budget, Meter, Metered};
