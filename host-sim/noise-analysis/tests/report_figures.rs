@@ -91,7 +91,7 @@ fn the_spectrum_of_a_condensed_record_is_that_of_all_its_samples() {
         stated_rate_hz: Some(RATE_HZ),
         slots: (0..SAMPLES).collect(),
         times_s: None,
-        channels: vec![gyro].into(),
+        channels: [gyro].into_iter().collect(),
         dropped: BTreeMap::new(),
         flagged: BTreeMap::new(),
     });

@@ -14,7 +14,7 @@ use crate::fit::signal_share::SignalShare;
 use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::estimators::RecordPart;
-use crate::rivals::channel_lines::fit_with_lines;
+use crate::rivals::channel_lines::{fit_with_lines, without_leakage};
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal, Signal};
 use crate::rivals::proposals::{ChannelFindings, propose};
 use crate::rivals::shown_by_samples::ShownBySamples;
@@ -101,6 +101,7 @@ impl TracedPart {
             let ChannelFit { curve, traced, .. } = &trace.fit;
             let quantized = trace.samples_of_noise().and_then(|samples| quantized_after_filter(curve, traced, samples));
             let ChannelTrace { fit, slowest, lines, signals, .. } = trace;
+            without_leakage(lines, fit.after());
             quantized.into_iter().for_each(|quantized| fit.traced = quantized);
             // Before the spectrum shows the same process.
             signals.iter().filter_map(Signal::decays).for_each(|decays| fit.add_shot_noise(decays));

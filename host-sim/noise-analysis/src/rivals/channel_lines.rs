@@ -49,11 +49,16 @@ pub(crate) fn fit_with_lines(
         lines.extend(faster.iter().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
-    lines.retain(|line| {
-        let gain = filter_gain(fit.after(), line.frequency.value);
-        stands_as_line(&LineClaim { gain, ..LineClaim::new(line, period_s) })
-    });
     (fit, lines)
+}
+
+/// Leaves out the `lines` that leak into a null of the filter of a channel's model. The filter that the channel has by itself, before it is
+/// known by all channels, may be a wrong one beside a strong band.
+pub(crate) fn without_leakage(lines: &mut Vec<MergedLine>, model: &Model) {
+    lines.retain(|line| {
+        let gain = filter_gain(model, line.frequency.value);
+        stands_as_line(&LineClaim { gain, ..LineClaim::new(line, model.sample_period()) })
+    });
 }
 
 /// The part of the density of white noise that passes the filter of the model, with what is folded, at `frequency` Hz.
