@@ -61,16 +61,16 @@ macro_rules! dtypes {
 
             /// The automatic grid, if these are floats.
             fn automatic_grid(self) -> Option<Grid> {
-                let (quantizer, step): (_, Option<f64>) = match self {
-                    $(Self::$name(values) => (
-                        $step.and_then(|_: f64| match values.as_slice() {
+                match self {
+                    $(Self::$name(values) => {
+                        let step: f64 = $step?;
+                        let quantizer = match values.as_slice() {
                             Some(values) => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
                             None => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
-                        }),
-                        $step,
-                    ),)*
-                };
-                quantizer.zip(step).map(|(quantizer, step)| (quantizer.origin(), quantizer.lsb() * step))
+                        }?;
+                        Some((quantizer.origin(), quantizer.lsb() * step))
+                    })*
+                }
             }
         }
 

@@ -26,7 +26,7 @@ pub struct ReadOptions {
     pub topic: Option<String>,
 }
 
-/// What the readers need of a profile.
+/// The part of a profile that the readers need.
 fn channels_of(sensor: &SensorProfile) -> SensorChannels {
     let channel = |of: &ChannelProfile| {
         let has_counts = *of != ChannelProfile::generic(of.name, of.quantity);

@@ -137,8 +137,8 @@ fn check(test: &str, run: &Run) {
 
 /// The frequency of gyro Z's tone changes, and accelerometer X shows it at half the frequency.
 fn tone(report: &Report, run: &Run) {
-    // Its mean spectrum over the record is 1.5 Hz wide in Python, with more than one peak, and that of 20 minutes half of it. So it is no
-    // resonance, whose interval would have to hold both.
+    // In Python its mean spectrum is 1.3 to 2.4 Hz wide over a record, and 0.8 to 1.5 Hz over 20 minutes of it. So it is no resonance, whose
+    // interval would have to hold both.
     let is_at_tone = |hz: f64| (run.tone_hz[0] - 0.5..run.tone_hz[1] + 0.5).contains(&hz);
     let effects = || of(report, "gyro_z").effects.iter().map(|shown| &shown.effect);
     assert!(!effects().any(|effect| matches!(effect, Effect::ResonantLine(of) if is_at_tone(of.frequency_hz.value))));

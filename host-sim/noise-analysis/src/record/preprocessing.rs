@@ -28,15 +28,21 @@ use std::sync::Arc;
 /// Effects in the samples, and the corrections that remove them.
 pub(crate) struct Preprocessing {
     slots: Arc<[u64]>,
+    rules: EventRules,
     by_whole: Shown,
     /// Findings of the first half, applied to both halves; `None` if not asked for.
     by_first_half: Option<Shown>,
     effects: PerChannel<Vec<Effect>>,
 }
 
+/// The rules by which knocks and spikes are sought in the record, and in what follows it.
+struct EventRules {
+    /// For the inertial channels.
+    knocks: KnockSearch,
+    spikes: PerChannel<Option<SpikeRule>>,
+}
+
 struct Shown {
-    /// The rules for knocks of the inertial channels.
-    search: Arc<KnockSearch>,
     /// Counts of the smallest step of each channel.
     counts_per_step: PerChannel<u32>,
     repeated: Vec<u64>,
@@ -48,7 +54,6 @@ struct ShownInChannel {
     /// Excluded sample periods, in ascending order.
     knocks: Vec<u64>,
     spikes: Vec<u64>,
-    spike_rule: Option<SpikeRule>,
     bias: ChannelBias,
 }
 
@@ -67,9 +72,9 @@ impl Preprocessing {
     /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels; those of the `first_half` hold in the second too.
     pub(crate) fn detect(record: &CondensedRecord, first_half: Option<&Self>) -> Self {
         let slots: Arc<[u64]> = record.means.slots.as_slice().into();
-        let by_first_half = || first_half.map(|half| half.by_whole.in_second_half(record, &slots));
-        let (by_first_half, (by_whole, effects)) = parallel::both(by_first_half, || Shown::find(record, &slots));
-        Self { slots, by_whole, by_first_half, effects }
+        let by_first_half = || first_half.map(|half| half.rules.continued(&half.by_whole, record, &slots));
+        let (by_first_half, (rules, by_whole, effects)) = parallel::both(by_first_half, || Shown::find(record, &slots));
+        Self { slots, rules, by_whole, by_first_half, effects }
     }
 
     /// Findings of a part; `None` if unused or not asked for.
@@ -183,19 +188,19 @@ fn all_measured(
 }
 
 impl Shown {
-    /// The findings in a record, and the effects of each channel.
-    fn find(record: &CondensedRecord, slots: &Arc<[u64]>) -> (Self, PerChannel<Vec<Effect>>) {
+    /// The findings in a record, after the rules for its events, and the effects of each channel.
+    fn find(record: &CondensedRecord, slots: &Arc<[u64]>) -> (EventRules, Self, PerChannel<Vec<Effect>>) {
         let measurement = record.means.as_ref();
         let counts_per_step = record.channels.map(|of| of.counts_per_step);
         let series = all_measured(measurement, slots, &counts_per_step);
-        let (search, loud) = loud_stretches(record, &series);
+        let (knock_rules, loud) = loud_stretches(record, &series);
         let once = series.map(|of| of.clone().without(&record.repeated));
         // Covariates, without their own knocks.
         let quiet = without_knocks(&once, &loud);
         let forces = forces(measurement, &quiet);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
-                return (ShownInChannel::default(), Vec::new());
+                return ((ShownInChannel::default(), None), Vec::new());
             }
             let LoudStretches { knocks, by_itself } = &loud[channel];
             let can_show_spikes = record.channels[channel].can_show_spikes;
@@ -208,45 +213,45 @@ impl Shown {
             let knocked = intervals(measurement, &loud, channel).into_iter().map(Effect::from);
             let effects = responses.iter().map(|of| of.effect.clone()).chain(knocked).chain(changes).collect();
             let knocks = slots_within(&once[channel], knocks);
-            (ShownInChannel { knocks, spikes: excluded, spike_rule, bias }, effects)
+            ((ShownInChannel { knocks, spikes: excluded, bias }, spike_rule), effects)
         };
-        let (channels, effects): (Vec<_>, Vec<_>) = per_channel(measurement.ids(), of_channel).into_iter().unzip();
-        let (search, repeated) = (search.into(), record.repeated.clone());
-        let shown = Self { search, counts_per_step, repeated, channels: channels.into() };
-        (shown, effects.into())
+        let ((channels, spikes), effects): ((Vec<_>, Vec<_>), Vec<_>) =
+            per_channel(measurement.ids(), of_channel).into_iter().unzip();
+        let rules = EventRules { knocks: knock_rules, spikes: spikes.into() };
+        (rules, Self { counts_per_step, repeated: record.repeated.clone(), channels: channels.into() }, effects.into())
     }
+}
 
-    /// These findings in the first half of a record, with the knocks and spikes of the second half by the same rules.
-    fn in_second_half(&self, record: &CondensedRecord, slots: &Arc<[u64]>) -> Self {
+impl EventRules {
+    /// The findings `of_first` half, whose rules these are, with the knocks and spikes of the second half of `record`.
+    fn continued(&self, of_first: &Shown, record: &CondensedRecord, slots: &Arc<[u64]>) -> Shown {
         let measurement = record.means.as_ref();
         let middle = measurement.middle();
-        let second = all_measured(measurement, slots, &self.counts_per_step).map(|of| of.from(middle));
+        let second = all_measured(measurement, slots, &of_first.counts_per_step).map(|of| of.from(middle));
         // Repeated samples of the second half are dropped by either exclusion.
         let repeated: Vec<u64> = record.repeated.iter().copied().filter(|slot| *slot >= middle).collect();
         let inertial: Vec<ChannelId> = measurement.inertial().collect();
         let searched: Vec<Series> = inertial.iter().map(|&of| second[of].clone()).collect();
-        let loud = of_inertial(measurement, self.search.find(&searched, &repeated));
+        let loud = of_inertial(measurement, self.knocks.find(&searched, &repeated));
         let once = second.map(|of| of.clone().without(&repeated));
         let quiet = without_knocks(&once, &loud);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
                 return ShownInChannel::default();
             }
-            let ShownInChannel { knocks, spikes, spike_rule, bias } = &self.channels[channel];
-            let LoudStretches { knocks: of_second, by_itself } = &loud[channel];
-            let later = spike_rule.as_ref().map(|rule| rule.slots(&quiet[channel], by_itself)).unwrap_or_default();
+            let ShownInChannel { knocks, spikes, bias } = &of_first.channels[channel];
+            let LoudStretches { knocks: later_knocks, by_itself } = &loud[channel];
+            let later_spikes = self.spikes[channel].as_ref().map(|rule| rule.slots(&quiet[channel], by_itself));
             ShownInChannel {
-                knocks: [&knocks[..], &slots_within(&once[channel], of_second)].concat(),
-                spikes: [&spikes[..], &later].concat(),
-                spike_rule: None,
+                knocks: [&knocks[..], &slots_within(&once[channel], later_knocks)].concat(),
+                spikes: [&spikes[..], &later_spikes.unwrap_or_default()].concat(),
                 bias: bias.clone(),
             }
         };
-        Self {
-            search: Arc::clone(&self.search),
-            counts_per_step: self.counts_per_step.clone(),
+        Shown {
+            counts_per_step: of_first.counts_per_step.clone(),
             channels: per_channel(measurement.ids(), of_channel),
-            repeated: [&self.repeated[..], &repeated].concat(),
+            repeated: [&of_first.repeated[..], &repeated].concat(),
         }
     }
 }

@@ -78,8 +78,8 @@ pub(crate) fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
     })
 }
 
-/// The spectrum of `series` in bands of equal width on a logarithmic axis. Of a series of means, the spectrum `of_samples` stands above
-/// four tenths of their rate, where they have lost a quarter of a sinusoid.
+/// The spectrum of `series` in bands of equal width on a logarithmic axis. If these are means, the spectrum `of_samples` stands above four
+/// tenths of their rate, where they have lost a quarter of a sinusoid.
 fn spectrum(series: &UniformSeries, of_samples: Option<&Welch>, model: impl Fn(f64) -> f64) -> Option<SpectrumReport> {
     let length = |segments: usize| {
         let samples = series.values().len() / segments;

@@ -12,7 +12,7 @@ const LEAST_CHANNELS: usize = 2;
 
 pub(crate) enum Records {
     Line,
-    /// Of several lines; a name that comes again begins the next. A line that ends in a colon names the group of those
+    /// Several lines are a record; a name that comes again begins the next. A line that ends in a colon names the group of those
     /// below, as in YAML.
     Block {
         group: String,
@@ -40,7 +40,7 @@ pub(crate) struct RowLayout {
 /// The effect of a line.
 pub(crate) enum Taken {
     Record(Record),
-    /// Of a record that is not complete.
+    /// A line of a record that is not complete.
     Part,
     Other,
 }

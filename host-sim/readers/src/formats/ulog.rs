@@ -19,10 +19,13 @@ const HEADER_BYTES: u64 = 16;
 const FIFO_SAMPLES: usize = 32;
 const TIME_UNIT: &str = "us";
 
-/// Channels and unit.
-type Vector = ([&'static str; 3], &'static str);
-const RATE: Vector = (GYROSCOPE, "rad/s");
-const FORCE: Vector = (ACCELEROMETER, "m/s^2");
+/// Three axes of a sensor.
+struct Vector {
+    channels: [&'static str; 3],
+    unit: &'static str,
+}
+const RATE: Vector = Vector { channels: GYROSCOPE, unit: "rad/s" };
+const FORCE: Vector = Vector { channels: ACCELEROMETER, unit: "m/s^2" };
 type Axes = ([&'static str; 3], Vector);
 const XYZ: [&str; 3] = ["x", "y", "z"];
 const SENSORS: [(&str, &[Axes]); 3] = [
@@ -161,7 +164,7 @@ impl<'a> UlogSource<'a> {
         if let Some((_, vector)) = FIFOS.iter().find(|(fifo, _)| fifo == name) {
             let columns = sample_columns(&XYZ);
             let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
-            sensor.add_axes(vector.0, [1, 2, 3], vector.1);
+            sensor.add_axes(vector.channels, [1, 2, 3], vector.unit);
             self.offer.topics.push(Topic { columns, sensors: vec![sensor], ..topic });
             self.rows.push(Rows::Fifo(key.clone()));
             return;
@@ -180,7 +183,7 @@ impl<'a> UlogSource<'a> {
         for (axes, vector) in SENSORS.iter().find(|(known, _)| known == name).map_or(&[][..], |(_, axes)| axes) {
             let [x, y, z] = axes.map(|axis| columns.iter().position(|column| column.name == axis));
             if let (Some(x), Some(y), Some(z)) = (x, y, z) {
-                sensor.add_axes(vector.0, [x, y, z], vector.1);
+                sensor.add_axes(vector.channels, [x, y, z], vector.unit);
             }
         }
         let sensors = Some(sensor).filter(|sensor| sensor.columns.len() > 1).into_iter().collect();
@@ -191,8 +194,8 @@ impl<'a> UlogSource<'a> {
     fn add_pair(&mut self, pair: [&'static str; 2], instance: u8, rows: u64) {
         let columns = sample_columns(&[GYROSCOPE, ACCELEROMETER].concat());
         let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
-        sensor.add_axes(GYROSCOPE, [1, 2, 3], RATE.1);
-        sensor.add_axes(ACCELEROMETER, [4, 5, 6], FORCE.1);
+        sensor.add_axes(RATE.channels, [1, 2, 3], RATE.unit);
+        sensor.add_axes(FORCE.channels, [4, 5, 6], FORCE.unit);
         let (name, kind, rows) = (pair_name(pair, instance), pair.join("+"), Some(rows));
         self.offer.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor], ..Topic::default() });
         self.rows.push(Rows::Pair(pair, instance));
