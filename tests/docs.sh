@@ -8,6 +8,6 @@ cd "$(dirname "$0")/.."
 
 [ $# -gt 0 ] || set -- --workspace
 status=0
-WRITE_DOCS=1 cargo test --locked --no-fail-fast "$@" in_the_docs || status=$?
+WRITE_DOCS=1 cargo test --locked --no-fail-fast "$@" in_the_docs -- --include-ignored || status=$?
 git --no-pager diff --stat
 exit $status

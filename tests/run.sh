@@ -7,9 +7,9 @@
 #
 # Without an option it runs the checks for a pull request. --quick runs formatting, lints, and the unit tests of the libraries and of the
 # host. --long also runs the tests that are marked `#[ignore = "long: …"]`, the tests on local clusters of Ray and Spark, for which it
-# installs both and Java, and the search for bytes that break a reader. Tests on measured recordings are skipped if ADIS_RECORDINGS does
-# not name their folder (docs/measured.md). --recordings runs only the tests that the last run skipped for this reason; none may be
-# skipped again.
+# installs both and Java, the search for bytes that break a reader, and the lints of the programs of tests/peers. Tests on measured
+# recordings are skipped if ADIS_RECORDINGS does not name their folder (docs/measured.md). --recordings runs only the tests that the last
+# run skipped for this reason; none may be skipped again.
 # The last lines are the seconds of each step by the clock and of the processor, and the numbers of passed, failed and skipped tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -21,7 +21,7 @@ BROWSER=wasm32-unknown-unknown
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 WITHOUT_RECORDINGS=$TARGET/tests-without-recordings # names of tests, one a line
-WORKSPACES=(. tests/tools adis16405-driver/examples-stm32f405 adis16405-driver/examples-rp2040 allan-core/examples-cortex-m)
+WORKSPACES=(. tests/tools tests/peers adis16405-driver/examples-stm32f405 adis16405-driver/examples-rp2040 allan-core/examples-cortex-m)
 STEPS=(
     "tools:install what is missing"
     "format:formatting"
@@ -41,7 +41,7 @@ case "${1-}" in
         STEPS=("quick_tools:install what is missing" "format:formatting" "unit_tests:lints and unit tests")
         ;;
     --long)
-        STEPS+=("search:search for bytes that break a reader")
+        STEPS+=("search:search for bytes that break a reader" "peers:lints of the programs that compare the project with its peers")
         chosen=(--profile long --run-ignored all)
         ;;
     --recordings)
@@ -59,6 +59,9 @@ FEATURES=(--locked --workspace --features
     adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt)
 # Clippy checks every crate of the workspace that is compiled, including the images that the tests build.
 export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/lint.sh CARGO_INCREMENTAL=0
+# What the host runs while it compiles for a microcontroller is compiled as for the tests, so that one copy serves both.
+ALIKE=(--config 'profile.dev.lto="off"' --config profile.dev.build-override.debug-assertions=false
+    --config profile.dev.build-override.overflow-checks=false)
 nextest() { run "$TARGET/python/bin/cargo-nextest" nextest run "${FEATURES[@]}" --show-progress none "$@"; }
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 debian() {
@@ -124,7 +127,7 @@ format() {
 }
 build() {
     nextest --no-run
-    (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
+    (cd tests/tools && run cargo programs --target-dir "$TARGET") # the tests start them
     export IMUNOISE=$TARGET/debug/imunoise # the program as just built
 }
 examples() { # workspaces that share frameworks, which are compiled once for each core
@@ -135,7 +138,7 @@ examples() { # workspaces that share frameworks, which are compiled once for eac
         (
             unset RUSTC_WORKSPACE_WRAPPER
             cd "$workspace"
-            run cargo clippy --locked --target "$core" --target-dir "$TARGET/examples" -- -D warnings
+            run cargo clippy "${ALIKE[@]}" --locked --target "$core" --target-dir "$TARGET" -- -D warnings
         )
     done
 }
@@ -185,6 +188,13 @@ tests() {
 }
 unit_tests() { nextest --lib 2>&1 | tee -a "$log"; }
 search() { run tests/fuzz.sh 10; }
+peers() {
+    (
+        unset RUSTC_WORKSPACE_WRAPPER
+        cd tests/peers
+        run cargo clippy "${ALIKE[@]}" --locked --all-targets --target-dir "$TARGET" -- -D warnings
+    )
+}
 recordings() {
     nextest "${chosen[@]}" 2>&1 | tee -a "$log"
     # Tests that are skipped again are printed at the end. Each listed name must be a test.

@@ -49,7 +49,6 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("allan-core-c", "allan-core"),
     ("fuzz", "adis16405-driver allan-core allan-core-c firmware link measurement recordings reports simulation virtual-sensor"),
     ("instruction-counts", "adis16405-driver allan-core"),
-    ("peers-accuracy", "allan-core noise-analysis virtual-sensor"),
 ];
 
 /// The variable that names the folder of the measured recordings.

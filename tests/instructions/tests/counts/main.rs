@@ -25,7 +25,13 @@ fn the_counts_of_the_images_are_within_their_bounds_and_in_the_docs() {
     functions::libm_has_an_error_below_1e_14();
     write_the_page_on_costs(m4f, m0_plus);
     write_quotations(m4f, m0_plus);
-    calls::the_documentation_of_each_call_has_its_costs();
+    calls::the_documentation_of_each_call_has_its_counts();
+}
+
+#[test]
+#[ignore = "long: an image for each of 26 calls takes a minute; run with --long"]
+fn the_flash_of_each_call_is_in_the_docs() {
+    calls::the_documentation_of_each_call_has_its_flash();
 }
 
 fn the_estimator_is_within_its_budget(m4f: &Counts, m0_plus: &Counts) {

@@ -2,9 +2,10 @@
 //! a million samples at 100 Hz, the same series for every method.
 //!
 //! ```console
-//! $ cargo run --release -p peers-accuracy
-//! $ python3 -m venv peers && peers/bin/pip install -r tests/peers/accuracy/requirements.txt
-//! $ cargo run --release -p peers-accuracy -- --python peers/bin/python --likelihood peers/bin/python
+//! $ cd tests/peers
+//! $ cargo run --release --bin accuracy
+//! $ python3 -m venv peers && peers/bin/pip install -r accuracy/requirements.txt
+//! $ cargo run --release --bin accuracy -- --python peers/bin/python --likelihood peers/bin/python
 //! ```
 
 mod case;

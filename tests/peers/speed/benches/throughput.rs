@@ -1,8 +1,8 @@
 //! Time per sample: singly and in slices, at several lengths of the record, and with the optional statistics.
 //!
-//! `cargo bench -p allan-core --features serde`; criterion prints the time of 1,000 samples and their rate.
+//! `cargo bench --manifest-path tests/peers/Cargo.toml`; criterion prints the time of 1,000 samples and their rate.
 
-#[path = "../tests/support/late_state.rs"]
+#[path = "../../../../allan-core/tests/support/late_state.rs"]
 mod late_state;
 
 use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
