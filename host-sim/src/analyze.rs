@@ -117,7 +117,7 @@ fn write_parts(
         if !output.quiet && !output.prints_to_standard_output() {
             output::show_screen(&report, Some(name))?;
         }
-        saved.push(SavedReport::from(&report));
+        saved.push(SavedReport::new(&report)?);
     }
     let Some(joined) = SavedReport::joined(saved)? else { return Ok(()) };
     let write = |(format, file): (ExportFormat, PathBuf)| write_noise(&joined, format, &file, output.axis, outputs);

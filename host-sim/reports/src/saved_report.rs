@@ -1,7 +1,7 @@
 //! The part of a report that other programs need: sample rate, curves, final models; from JSON (schema 2) or memory.
 
 use crate::coefficients::{KINDS, white_noise};
-use noise_analysis::report::{ChannelReport, CurvePoint, DataSheetReport, ModelReport, Parameter, Report, SCHEMA};
+use noise_analysis::report::{CurvePoint, DataSheetReport, Parameter, Report, SCHEMA};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 
@@ -84,6 +84,14 @@ fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64
 }
 
 impl SavedReport {
+    /// The part of a report in memory, by its JSON.
+    ///
+    /// # Errors
+    /// A number of the report is not finite.
+    pub fn new(report: &Report) -> Result<Self, SavedReportError> {
+        serde_json::to_value(report).and_then(serde_json::from_value).map_err(SavedReportError::NoReport)
+    }
+
     /// Reads the JSON of `analyze -o report.json`.
     ///
     /// # Errors
@@ -181,40 +189,6 @@ impl SavedTerm {
 
     pub(crate) fn is_in_place_of_white_noise(&self) -> bool {
         self.parameters.contains_key(BELOW_CORNER)
-    }
-}
-
-impl From<&Report> for SavedReport {
-    fn from(report: &Report) -> Self {
-        Self {
-            sample_rate_hz: report.sample_rate_hz,
-            channels: report.channels.iter().map(SavedChannel::from).collect(),
-            other_rates_hz: Vec::new(),
-        }
-    }
-}
-
-impl From<&ChannelReport> for SavedChannel {
-    fn from(channel: &ChannelReport) -> Self {
-        Self {
-            name: channel.name.clone(),
-            unit: channel.unit.clone(),
-            curve: channel.curve.clone(),
-            refitted: SavedModel::from(&channel.refitted),
-            unseen_error: channel.after.unseen.deviance_per_point,
-            data_sheet: channel.figure_data.data_sheet.clone(),
-        }
-    }
-}
-
-impl From<&ModelReport> for SavedModel {
-    fn from(model: &ModelReport) -> Self {
-        let parameters = |(name, of): (&str, Parameter)| (name.to_owned(), of);
-        let terms = model.terms.iter().map(|term| SavedTerm {
-            kind: term.kind().to_owned(),
-            parameters: term.parameters().into_iter().map(parameters).collect(),
-        });
-        Self { terms: terms.collect(), adev: model.adev.clone() }
     }
 }
 
