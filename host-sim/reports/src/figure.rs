@@ -44,7 +44,6 @@ const RULES: [(&str, &str, &str); 8] = [
     (".cursor{stroke", "#1c2430", "#e6eaf0"),
 ];
 
-/// A figure of the page or of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Name of its file, without an ending.
@@ -124,7 +123,6 @@ pub(crate) fn strongest(report: &Report) -> Option<Plot> {
     Some(Plot { id: "strongest".to_owned(), ..plot })
 }
 
-/// Curves of the gyros and of the accelerometers with models and data sheet.
 pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
     [("gyro_", "gyros"), ("accl_", "accelerometers")]
         .into_iter()
@@ -132,7 +130,6 @@ pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
         .collect()
 }
 
-/// The channels whose names begin with `prefix`; `None` without any.
 fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
     let has_curve = |channel: &&ChannelReport| channel.curve.iter().any(|point| has_logarithm(point.adev));
     let of_prefix = report.channels.iter().filter(|channel| channel.name.starts_with(prefix));
@@ -175,7 +172,6 @@ fn data_sheet_line(sheet: &DataSheetReport, taus: &[f64]) -> Line {
     Line::new("data sheet, mean and ±1 σ over parts", Look::Reference, points).with_bounds(bounds)
 }
 
-/// The stated random walk, minimum, and rate random walk.
 fn stated_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
     let of = |tau: f64| {
         let square = |value: Option<f64>| value.map_or(0.0, |value| value * value);

@@ -20,7 +20,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
-/// The style of the page.
 pub const STYLE: &str = include_str!("page/style.css");
 /// The script of the page, as it stands in its element.
 pub const SCRIPT: &str = include_str!("page/script.js");
@@ -70,7 +69,6 @@ pub fn live(view: &LiveView) -> String {
     .into_string()
 }
 
-/// The style sheet of the figures, and what changes in it on dark ground.
 #[must_use]
 pub fn figure_styles() -> [String; 2] {
     figure::style()
@@ -126,7 +124,6 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
     }
 }
 
-/// The file, and rows that are no samples.
 fn what_was_read(reading: &ReadingRecord) -> Markup {
     html! {
         section id="file" aria-label="What was read" {
@@ -160,7 +157,6 @@ fn contents(report: &Report) -> Markup {
     }
 }
 
-/// Trust, N, B and K, next steps.
 fn verdict(report: &Report, reading: Option<&ReadingRecord>) -> Markup {
     let answer = summary::answer(report);
     html! {
@@ -190,7 +186,6 @@ fn unparted(text: &str) -> String {
     text.replace(" %", "\u{a0}%")
 }
 
-/// Advice with links to its findings, and the number of unexplained places.
 fn what_to_do(report: &Report) -> Markup {
     html! {
         @let (advice, for_filter) = (summary::advice(report), summary::for_filter(report));

@@ -1,11 +1,9 @@
 //! The record of the reading: rows read and rows left out.
 
-use crate::formatting::count;
-use crate::formatting::words;
+use crate::formatting::{count, of_each_cause};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The reading of a recording.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReadingRecord {
     pub file: String,
@@ -33,7 +31,6 @@ pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, p
     causes.filter(|(_, rows)| *rows > 0).map(|(cause, rows)| (cause.to_owned(), rows)).collect()
 }
 
-/// Options of the reading.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ReadingOptions<'a> {
     pub topic: Option<&'a str>,
@@ -81,7 +78,6 @@ impl ReadingRecord {
         (!self.complete).then(|| format!("Not read to its end: {why}."))
     }
 
-    /// Lines for the page.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let options =
@@ -93,11 +89,8 @@ impl ReadingRecord {
             self.program,
             self.version
         )];
-        let left_out: Vec<String> =
-            self.left_out.iter().map(|(cause, rows)| format!("{} {}", count(*rows), words(cause))).collect();
-        if !left_out.is_empty() {
-            lines.push(format!("Rows that are no samples: {}.", left_out.join(", ")));
-        }
+        let left_out = of_each_cause(&self.left_out);
+        lines.extend((!left_out.is_empty()).then(|| format!("Rows that are no samples: {left_out}.")));
         lines.extend(self.incomplete());
         lines.extend(self.notes.iter().map(|note| format!("{note}.")));
         lines.extend(self.sha256.iter().map(|sha256| format!("SHA-256 {sha256}")));

@@ -34,7 +34,6 @@ fn fixed(value: f64, decimals: usize) -> String {
     fraction.map_or_else(|| format!("{sign}{whole}"), |fraction| format!("{sign}{whole}.{fraction}"))
 }
 
-/// Thousands separated by commas.
 pub(crate) fn grouped(digits: &str) -> String {
     let is_start = |at: usize| at > 0 && (digits.len() - at).is_multiple_of(3);
     digits.char_indices().flat_map(|(at, digit)| is_start(at).then_some(',').into_iter().chain([digit])).collect()
@@ -194,7 +193,6 @@ pub fn quantity(value: f64, name: &str) -> String {
     quantity_digits(value, name, 2)
 }
 
-/// A quantity with `digits` significant digits.
 #[must_use]
 pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
     if !value.is_finite() {
@@ -215,7 +213,6 @@ pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
     }
 }
 
-/// A parameter with the digits of its interval, without the interval.
 #[must_use]
 pub fn rounded_quantity(parameter: &Parameter) -> String {
     let &Parameter { value, low, high, ref unit } = parameter;
@@ -252,13 +249,11 @@ impl Scale {
         Self { unit, factor }
     }
 
-    /// `value` with so many significant digits.
     #[must_use]
     pub fn number(&self, value: f64, digits: i32) -> String {
         significant(value / self.factor, digits)
     }
 
-    /// A parameter with its bounds.
     #[must_use]
     pub fn estimate(&self, &Parameter { value, low, high, .. }: &Parameter) -> String {
         let scaled = |of: f64| of / self.factor;

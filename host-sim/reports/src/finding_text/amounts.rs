@@ -18,7 +18,7 @@ pub(super) struct Amounts<'a> {
 
 /// Text before a channel's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Label {
+pub(crate) enum Label {
     Nothing,
     /// All gyros, or all accelerometers: the axis.
     Axis,
