@@ -18,7 +18,6 @@ pub(crate) fn white_noise(terms: impl Iterator<Item = Parameter>) -> Option<Para
 }
 
 /// A coefficient of the model to use; N of all white noise, also below the corner of a process that replaces it.
-#[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
     let mut terms = channel.refitted.terms.iter();
     if kind == KINDS[0] {

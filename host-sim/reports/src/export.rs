@@ -169,7 +169,6 @@ mod tests {
         }
     }
 
-    /// If the interval begins at zero.
     #[test]
     fn a_coefficient_whose_interval_begins_at_zero_is_an_upper_bound() {
         let mut known = report("0.01", "gyro_w");

@@ -52,7 +52,6 @@ pub struct Picture {
     pub svg: String,
 }
 
-/// The style sheet of the figures, for a light ground, and what changes on a dark one.
 pub(crate) fn style() -> [String; 2] {
     let colours = |ground: usize| {
         let of = |(class, light, dark): &(&str, &str, &str)| {
@@ -76,8 +75,6 @@ fn standalone(plot: &Plot) -> Picture {
     Picture { name: plot.id.clone(), svg: plot.file(&light).into_string() }
 }
 
-/// Every figure of a report, in the order of the page.
-#[must_use]
 pub fn pictures(report: &Report) -> Vec<Picture> {
     let overview = story(report).into_iter().chain(overviews(report));
     let channels = report.channels.iter().flat_map(|channel| channel_plots(report, channel));
@@ -93,8 +90,6 @@ pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plo
         .collect()
 }
 
-/// The Allan deviation of `channel` as an SVG document.
-#[must_use]
 pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
     standalone(&allan_deviation_plot(report, channel)).svg
 }

@@ -22,7 +22,6 @@ use std::collections::BTreeMap;
 const DONE: &str = "(done) ";
 const COMPENSATE: &str = "(compensate) ";
 
-/// A finding in words.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FindingText {
     /// The channels that show it, such as `gyro z` or `accel x y`.
@@ -41,7 +40,6 @@ pub struct FindingText {
 }
 
 impl FindingText {
-    /// Physics and weight.
     pub(crate) fn sentences(&self) -> String {
         let weight = if self.weight.is_empty() { String::new() } else { format!(" {}.", capital(&self.weight)) };
         format!("{}{weight}", self.physics)
@@ -49,7 +47,6 @@ impl FindingText {
 }
 
 /// `shown` has each channel's numbers; without it, those of the clearest channel are used.
-#[must_use]
 pub fn describe(finding: &Finding, shown: &[ShownEffect]) -> FindingText {
     let clearest = finding.channels.get(finding.clearest).map_or("", String::as_str);
     let alone = [ShownEffect { channel: clearest, effect: &finding.effect }];

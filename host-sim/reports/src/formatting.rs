@@ -17,7 +17,6 @@ pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), number)
 }
 
-/// A percentage with its sign, or [`NONE`].
 pub fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), |value| format!("{} %", number(value)))
 }
@@ -78,7 +77,6 @@ pub fn interval(low: f64, high: f64) -> String {
 }
 
 /// Capitalised, except `σ`.
-#[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| [first.to_ascii_uppercase()].into_iter().chain(letters).collect())
@@ -147,7 +145,6 @@ pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     (sigma.abs() > FAR_OFF).then(|| format!("{text} ({} sigma)", number(sigma)))
 }
 
-/// Deviations of the channel's models beyond chance, by half.
 pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     let (before, after) = (("before: ", &channel.before), ("after: ", &channel.after));
     let models = if channel.before == channel.after { vec![("", &channel.after)] } else { vec![before, after] };
@@ -159,7 +156,6 @@ pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     models.into_iter().flat_map(told).collect()
 }
 
-/// Recording time for a coefficient within ±20 %.
 pub fn recording_advice(record: &RecordLength) -> String {
     let kind = words(&record.kind);
     match record.more_hours {
@@ -174,7 +170,6 @@ pub fn wrap(text: &str, width: usize) -> String {
     broken(text, width, "  ").join("\n")
 }
 
-/// A table without a frame.
 pub(crate) fn plain_table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING).set_header(header);

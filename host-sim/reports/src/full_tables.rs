@@ -22,7 +22,6 @@ use std::io::{self, Write};
 
 const WIDTH: u16 = 100;
 
-/// Writes the whole report with the recording's name.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
     let title = format!("{} noise report", summary::part_name(report));
     writeln!(out, "{title}{}", source.map_or_else(String::new, |source| format!("   {source}")))?;
@@ -71,7 +70,6 @@ const EXCLUDING: &str = "\
 excluding: without what the first half's rules for spikes and knocks find in the unseen half; the
 models after foretell these in the unseen half as recorded, at the rate of the first half.";
 
-/// The content of the screen, without its limits.
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
     writeln!(out)?;
@@ -143,7 +141,6 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", framed(report_tables::curve(channel)))
 }
 
-/// In a frame.
 fn framed(ReportTable { headings, rows, text_columns }: ReportTable) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED).apply_modifier(modifiers::UTF8_ROUND_CORNERS);

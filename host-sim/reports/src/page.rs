@@ -28,13 +28,10 @@ const DEFINITIONS: &str = include_str!("page/definitions.html");
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 /// The report on the recording `source` as a page, with the record of the reading.
-#[must_use]
 pub fn html(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::Whole).into_string()
 }
 
-/// The first screen of that page.
-#[must_use]
 pub fn first_screen(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::FirstScreen).into_string()
 }
@@ -46,7 +43,6 @@ enum Extent {
 }
 
 /// A growing record as a part of a page: verdict, curves, findings and health, as on a terminal's screen.
-#[must_use]
 pub fn live(view: &LiveView) -> String {
     let LiveView { headline, sentences, tables, curves, findings, unexplained, advice, health, status } = view;
     html! {
@@ -69,7 +65,6 @@ pub fn live(view: &LiveView) -> String {
     .into_string()
 }
 
-#[must_use]
 pub fn figure_styles() -> [String; 2] {
     figure::style()
 }
@@ -133,7 +128,6 @@ fn what_was_read(reading: &ReadingRecord) -> Markup {
     }
 }
 
-/// Gyros, accelerometers, conditions.
 fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     let rank = |channel: &ChannelReport| {
         let known = SENSED.iter().position(|prefix| channel.name.starts_with(prefix));
@@ -222,7 +216,6 @@ fn disagreements(report: &Report) -> Markup {
     }
 }
 
-/// A figure with its values for pointer and keyboard.
 fn drawing(plot: &Plot) -> Markup {
     html! {
         figure id=(plot.id) tabindex="0" aria-label={ (plot.title) ". Arrow keys read the values." } {

@@ -13,7 +13,6 @@ pub struct ReadingRecord {
     pub version: String,
     pub options: Vec<String>,
     pub rows: u64,
-    /// Rows that are no samples, by cause.
     pub left_out: BTreeMap<String, u64>,
     /// False for a part of the file.
     pub complete: bool,
@@ -24,7 +23,6 @@ pub struct ReadingRecord {
 }
 
 /// Rows that are no samples, by cause: `dropped`, outside of the part, and padding.
-#[must_use]
 pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, padding: u64) -> BTreeMap<String, u64> {
     let dropped = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(cause, rows)| (*cause, *rows));
     let causes = dropped.chain([("outside_part", outside_part), ("padding", padding)]);
@@ -51,8 +49,6 @@ pub struct ReadingOptions<'a> {
 }
 
 impl ReadingOptions<'_> {
-    /// The options as typed on the command line.
-    #[must_use]
     pub fn words(&self) -> Vec<String> {
         let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
         let number = |number: Option<f64>| number.map(|number| number.to_string());
@@ -72,13 +68,11 @@ impl ReadingOptions<'_> {
 
 impl ReadingRecord {
     /// A sentence if the reading ended early.
-    #[must_use]
     pub fn incomplete(&self) -> Option<String> {
         let why = self.damage.clone().unwrap_or_else(|| "the reading was stopped".to_owned());
         (!self.complete).then(|| format!("Not read to its end: {why}."))
     }
 
-    #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let options =
             if self.options.is_empty() { String::new() } else { format!(", with {}", self.options.join(" ")) };

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 /// Parameter: N below the corner of a process that replaces white noise.
 const BELOW_CORNER: &str = "white_noise";
 
-/// The noise of a sensor by a report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedReport {
     /// Hz.
@@ -19,10 +18,8 @@ pub struct SavedReport {
     pub other_rates_hz: Vec<f64>,
 }
 
-/// One output of the sensor.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedChannel {
-    /// Such as `gyro_z`.
     pub name: String,
     /// Unit of the deviations, such as `deg/s`.
     pub unit: String,
@@ -34,7 +31,6 @@ pub struct SavedChannel {
     /// Deviance per point of the first half's model on the second, 1 for a true model; absent for short records.
     #[serde(default, rename = "after", deserialize_with = "unseen_error")]
     pub unseen_error: Option<f64>,
-    /// Typical noise by the data sheet, if known.
     pub data_sheet: Option<DataSheetReport>,
 }
 
@@ -47,13 +43,11 @@ pub struct SavedModel {
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedTerm {
-    /// Such as `angle_random_walk`.
     pub kind: String,
     /// By name, as in [`noise_analysis::report::TermReport::parameters`].
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// Reasons to refuse a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedReportError {
@@ -62,11 +56,7 @@ pub enum SavedReportError {
     #[error("schema {0}, where this program reads schema {SCHEMA}")]
     Schema(u64),
     #[error("{path}: {reason}")]
-    Field {
-        /// Such as `channels[3].final`.
-        path: String,
-        reason: serde_json::Error,
-    },
+    Field { path: String, reason: serde_json::Error },
     #[error("{0}: the report contradicts itself; make it anew with `analyze -o report.json`")]
     Contradiction(String),
     #[error("{0} is in both reports; those of one sensor's parts have different channels")]
@@ -162,7 +152,6 @@ impl SavedReport {
         Ok(joined)
     }
 
-    #[must_use]
     pub fn channel(&self, name: &str) -> Option<&SavedChannel> {
         self.channels.iter().find(|channel| channel.name == name)
     }
@@ -170,7 +159,6 @@ impl SavedReport {
 
 impl SavedChannel {
     /// The coefficient of the term `kind`; N of all white noise, also below the corner of a process that replaces it.
-    #[must_use]
     pub fn coefficient(&self, kind: &str) -> Option<Parameter> {
         let mut terms = self.refitted.terms.iter();
         if kind == KINDS[0] {

@@ -47,13 +47,10 @@ const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, 
                      have in common, and changes of the noise were not looked for.";
 
 /// Name of the part, or a description without a profile.
-#[must_use]
 pub fn part_name(report: &Report) -> &str {
     if ["", "generic"].contains(&report.part.name.as_str()) { "Inertial sensor" } else { &report.part.name }
 }
 
-/// Part, number of samples, length and rate.
-#[must_use]
 pub fn headline(report: &Report, source: Option<&str>) -> Vec<String> {
     let length = span(report_length_s(report));
     let rate = plain(report.sample_rate_hz, 4);
@@ -67,7 +64,6 @@ pub fn headline(report: &Report, source: Option<&str>) -> Vec<String> {
 }
 
 /// The sentence for no finding, with its channels.
-#[must_use]
 pub fn nothing_found(report: &Report) -> String {
     let sensed = report.channels.iter().filter(|channel| is_sensed(channel) && !is_constant(channel));
     let (failing, described): (Vec<&ChannelReport>, Vec<&ChannelReport>) = sensed.partition(|channel| is_high(channel));
@@ -91,7 +87,6 @@ pub fn nothing_found(report: &Report) -> String {
 }
 
 /// Trust, rest and losses, error on the unseen half, use of the length, errors without spikes and knocks.
-#[must_use]
 pub fn record_sentences(report: &Report) -> Vec<String> {
     answer(report).into_iter().chain(record_in_detail(report)).collect()
 }
@@ -109,7 +104,6 @@ pub(crate) fn record_in_detail(report: &Report) -> Vec<String> {
 }
 
 /// Sentences for the screen: fewer notes, nothing of its table.
-#[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     let LengthAdvice { known, longer, .. } = length_advice(report);
     let notes = part_note::in_short(&told_notes(report));
@@ -120,7 +114,6 @@ pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     sentences.chain(notes).chain(recent_fit(report)).collect()
 }
 
-/// Trust, rest and losses.
 fn condition(report: &Report) -> Vec<String> {
     let mut sentences = vec![trust(report), rest(report), losses(report)];
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
@@ -162,8 +155,6 @@ fn told_notes(report: &Report) -> Vec<PartNote> {
     report.part.notes.iter().filter(is_told).cloned().collect()
 }
 
-/// Unknown properties of the sensor's clock and filter, with reasons.
-#[must_use]
 pub fn part_notes(report: &Report) -> Vec<String> {
     told_notes(report).iter().map(part_note::sentence).collect()
 }

@@ -13,7 +13,6 @@ pub const MOST_LINES: usize = 30;
 const NARROWEST: usize = 80;
 const WIDEST: usize = 200;
 const TEXT: usize = 110;
-/// Columns of label and error.
 const LABEL: usize = 7;
 const ERROR: usize = 17;
 /// Most lines of sentences on the record, and on conditions.
@@ -31,7 +30,6 @@ const WARNING: Style = AnsiColor::Yellow.on_default().bold();
 #[derive(Debug, Clone, Copy)]
 pub struct Screen<'a> {
     pub report: &'a Report,
-    /// Name of the recording, if it has one.
     pub source: Option<&'a str>,
     pub columns: usize,
 }
@@ -53,7 +51,6 @@ impl Screen<'_> {
     }
 
     /// Lines with styles; blocks below the findings are cut to give each finding a line.
-    #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines = self.above();
         let (found, _) = summary::findings(self.report);
@@ -163,7 +160,6 @@ impl Screen<'_> {
     }
 }
 
-/// `texts` beside a heading.
 fn block(heading: &str, texts: &[String], style: Style) -> Vec<String> {
     let labelled = |(index, text): (usize, &String)| {
         let label = if index == 0 { heading } else { "" };

@@ -10,7 +10,6 @@ pub enum AxisChoice {
     Worst,
 }
 
-/// Why a report cannot be written in a format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {

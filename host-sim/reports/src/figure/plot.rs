@@ -259,7 +259,6 @@ impl Plot {
         }
     }
 
-    /// Axes and lines of every panel, for the page's script.
     pub(crate) fn values(&self) -> String {
         let panels: Vec<String> = self.panels.iter().map(Panel::values).collect();
         format!("[{}]", panels.join(","))

@@ -16,7 +16,6 @@ pub(super) struct Amounts<'a> {
     pub is_brief: bool,
 }
 
-/// Text before a channel's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Label {
     Nothing,

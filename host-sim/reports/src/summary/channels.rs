@@ -12,7 +12,6 @@ pub(crate) fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> 
     report.channels.iter().filter(|channel| is_inertial(&channel.name))
 }
 
-/// Gyro, accelerometer or magnetometer.
 pub(crate) fn is_sensed(channel: &ChannelReport) -> bool {
     SENSED.iter().any(|prefix| channel.name.starts_with(prefix))
 }
@@ -22,7 +21,6 @@ pub(super) fn is_constant(channel: &ChannelReport) -> bool {
     !channel.curve.is_empty() && channel.curve.iter().all(|point| point.adev == 0.0)
 }
 
-/// The inertial channels that are so, in few words; `None` without any.
 pub(super) fn inertial_names(report: &Report, is_so: impl Fn(&ChannelReport) -> bool) -> Option<String> {
     let names: Vec<&String> = inertial(report).filter(|channel| is_so(channel)).map(|channel| &channel.name).collect();
     (!names.is_empty()).then(|| channel_list(names))

@@ -9,7 +9,6 @@ use noise_analysis::units::conversions;
 /// Minimum of the Allan deviation over B: `sqrt(2 ln 2/π)`.
 const MINIMUM_OVER_B: f64 = 0.664;
 
-/// A group of inertial channels with their units.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CoefficientTable {
     /// `gyro` or `accel`.
@@ -88,7 +87,6 @@ impl From<&ChannelReport> for ChannelCoefficients {
     }
 }
 
-#[must_use]
 pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
     let channels: Vec<ChannelCoefficients> = report.channels.iter().map(ChannelCoefficients::from).collect();
     let sheet = |prefix: &str| {
@@ -111,7 +109,6 @@ pub(crate) fn coefficients_in_short(report: &Report, channel: &str) -> [String; 
 }
 
 /// Tables of channels at `sample_rate_hz`, without a data sheet.
-#[must_use]
 pub fn tables_of_channels(channels: &[ChannelCoefficients], sample_rate_hz: f64) -> Vec<CoefficientTable> {
     tables_of(channels, sample_rate_hz, |_| None)
 }

@@ -27,7 +27,6 @@ pub(super) fn report_length_s(report: &Report) -> f64 {
 }
 
 /// The longest stretch at rest: of the whole file if it was examined, else of the record.
-#[must_use]
 pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
     let stretches = || inertial(report).flat_map(|channel| &channel.at_rest);
     let longest = || stretches().max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s))).copied();
@@ -35,7 +34,6 @@ pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
 }
 
 /// Options for a part of a recording, in tenths of a second inside of it.
-#[must_use]
 pub fn time_options(from_s: f64, to_s: f64) -> String {
     let TimeRange { from_s, to_s } = TimeRange { from_s, to_s }.whole_tenths();
     format!("--from {from_s} --to {to_s}")
@@ -86,7 +84,6 @@ pub(super) fn losses(report: &Report) -> String {
     format!("{lost}{}{refused}.", missing_values(report))
 }
 
-/// Missing values of some channels, as a part of a sentence.
 fn missing_values(report: &Report) -> String {
     let missing = |channel: &ChannelReport| channel.missing.refused.get(MISSING).copied().unwrap_or(0);
     let with_missing: Vec<&ChannelReport> = report.channels.iter().filter(|channel| missing(channel) > 0).collect();

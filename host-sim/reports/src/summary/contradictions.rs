@@ -59,8 +59,6 @@ fn claiming_too_much(report: &Report) -> Vec<&String> {
     unsure.map(|channel| &channel.name).collect()
 }
 
-/// One text each, the least probable first.
-#[must_use]
 pub fn contradictions(report: &Report) -> Vec<String> {
     let standard_errors = |far: &FarOff| format!("{} ({} standard errors)", far.place, significant(far.sigma, 2));
     let unsure = claiming_too_much(report);
@@ -70,7 +68,6 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     far_off(report).iter().map(standard_errors).chain(filter).collect()
 }
 
-/// Number of the contradictions and the largest of them; `None` without any.
 pub(crate) fn contradictions_in_short(report: &Report) -> Option<String> {
     let (far, unsure) = (far_off(report), claiming_too_much(report));
     let largest = far.iter().max_by(|a, b| a.logarithm.total_cmp(&b.logarithm)).map(|far| far.place.clone());

@@ -51,12 +51,10 @@ fn departures(report: &Report) -> Vec<Departure<'_>> {
     departures
 }
 
-#[must_use]
 pub fn unexplained(report: &Report) -> Vec<String> {
     departures(report).iter().map(Departure::text).collect()
 }
 
-/// Number and largest of the departures; `None` without any.
 pub(crate) fn unexplained_in_short(report: &Report) -> Option<String> {
     let departures = departures(report);
     let largest = departures.iter().max_by(|a, b| a.largest().total_cmp(&b.largest()))?;

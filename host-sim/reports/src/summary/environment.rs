@@ -8,8 +8,6 @@ use crate::rounding::{column_prefix, estimate, extremes, parameter_magnitude, qu
 use noise_analysis::distributions::quantile;
 use noise_analysis::report::{BiasOverTime, ChannelReport, Parameter, Report};
 
-/// Magnetometers, temperature, supply: one text each.
-#[must_use]
 pub fn conditions(report: &Report) -> Vec<String> {
     let moved = |name: &str, label: &str| {
         let channel = report.channels.iter().find(|channel| channel.name == name)?;

@@ -50,7 +50,6 @@ pub(crate) fn finding_text(report: &Report, index: usize) -> FindingText {
 }
 
 /// Findings in words in their order, and the unexplained ones.
-#[must_use]
 pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
     let named = named_findings(report).len();
     let mut texts: Vec<FindingText> =
@@ -59,7 +58,6 @@ pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
     (texts, unexplained)
 }
 
-/// A line of another channel that moves with the finding's.
 fn related_line(report: &Report, finding: &Finding) -> Option<String> {
     let frequency = finding.effect.frequency_hz()?.value;
     let of = finding.channels.iter().find_map(|name| {
@@ -99,7 +97,6 @@ pub(crate) fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
 }
 
 /// Advice with the numbers of its findings: `Look for a fan, a motor or the mains (2, 5).`
-#[must_use]
 pub fn numbered_steps(report: &Report) -> Vec<String> {
     let numbered = |(step, numbers): (String, Vec<usize>)| {
         let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();

@@ -19,7 +19,6 @@ pub(super) fn is_high(channel: &ChannelReport) -> bool {
     channel.after.unseen.deviance_per_point.is_some_and(|of| of > HIGH_DEVIANCE)
 }
 
-#[must_use]
 pub fn is_fitted_to_later_quarter(channel: &ChannelReport) -> bool {
     channel.nonstationarity.as_ref().is_some_and(|of| of.fitted_to == FittedPart::LaterQuarter)
 }
