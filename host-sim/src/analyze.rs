@@ -223,6 +223,8 @@ fn analyze_stream(stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStrea
     Ok(progress::analysing(|watch| samples.analyze(watch)))
 }
 
+/// Most columns that a note names on the screen.
+const MOST_COLUMNS: usize = 8;
 /// Before the names in a note on many columns.
 const THEY_ARE: &str = ". They are ";
 const NOT_NAMED: &str = " left out: --columns does not name it";
@@ -240,10 +242,10 @@ fn note_without(note: &str, read: &[String]) -> Option<String> {
     let (head, many) = note.split_once(THEY_ARE).map_or((note, None), |(head, names)| (head, Some(names)));
     let Some(few) = head.strip_suffix(NOT_NAMED).filter(|_| !read.is_empty()) else { return Some(note.to_owned()) };
     let names: Vec<&str> = many.unwrap_or(few).split(", ").filter(|name| !read.iter().any(|of| of == name)).collect();
-    match (names.len(), many) {
-        (0, _) => None,
-        (count, Some(_)) => Some(format!("{count} columns{NOT_NAMED}{THEY_ARE}{}", names.join(", "))),
-        _ => Some(format!("{}{NOT_NAMED}", names.join(", "))),
+    match names.len() {
+        0 => None,
+        1..=MOST_COLUMNS => Some(format!("{}{NOT_NAMED}", names.join(", "))),
+        count => Some(format!("{count} columns{NOT_NAMED}{THEY_ARE}{}", names.join(", "))),
     }
 }
 
