@@ -17,16 +17,12 @@ fn moments(hours: &[Hour], of: impl Fn(&Hour) -> f64) -> [f64; 2] {
 fn the_slope_method_is_biased_by_the_other_terms_and_the_fit_is_not() {
     let result = Reproduction { seeds: SEEDS, first_seed: 1000 }.run(|_| ());
     let root = (SEEDS as f64).sqrt();
-    for term in 0..3 {
-        // The tolerance is four deviations, which are known to a fifth, and 0.1 % for flicker noise in the filter.
-        let estimates: [(fn(&Hour) -> [f64; 3], f64); 3] = [
-            (|hour| hour.slopes[0], result.inherent[term]),
-            (|hour| hour.slopes[1], result.inherent[term]),
-            (|hour| hour.fitted, 0.0),
-        ];
-        for (of, expected) in estimates {
-            let [mean, scatter] = moments(&result.hours, |hour| of(hour)[term] / TRUTH[term]);
+    for (term, truth) in TRUTH.into_iter().enumerate() {
+        let by_method = |hour: &Hour| [hour.slopes[0], hour.slopes[1], hour.fitted];
+        for (method, expected) in [result.inherent[term], result.inherent[term], 0.0].into_iter().enumerate() {
+            let [mean, scatter] = moments(&result.hours, |hour| by_method(hour)[method][term] / truth);
             let bias = mean - 1.0;
+            // The tolerance is four deviations, which are known to a fifth, and 0.1 % for flicker noise in the filter.
             assert!((bias - expected).abs() < 1e-3 + 4.0 * scatter / root, "term {term}: {bias} ± {scatter}");
         }
         // 11 or fewer of 16 intervals cover once in 1000 cases.
