@@ -16,8 +16,9 @@ pub(super) struct Amounts<'a> {
     pub is_brief: bool,
 }
 
+/// Text before a channel's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Label {
+pub(super) enum Label {
     Nothing,
     /// All gyros, or all accelerometers: the axis.
     Axis,

@@ -3,6 +3,7 @@
 use crate::formatting::words;
 use noise_analysis::report::ChannelReport;
 
+/// The name of a channel, such as `accel x`.
 pub(crate) fn channel_name(channel: &ChannelReport) -> String {
     channel_list([&channel.name])
 }
@@ -14,6 +15,7 @@ pub(crate) const SENSED: [&str; 3] = ["gyro_", "accl_", "magn_"];
 pub(crate) const ALL_CHANNELS: &str = "all channels";
 
 /// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
+#[must_use]
 pub fn channel_list<N: AsRef<str>>(names: impl IntoIterator<Item = N>) -> String {
     let names: Vec<N> = names.into_iter().collect();
     list(&names.iter().map(AsRef::as_ref).collect::<Vec<&str>>())

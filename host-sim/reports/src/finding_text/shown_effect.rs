@@ -3,6 +3,7 @@
 use noise_analysis::effects::Effect;
 use noise_analysis::report::Report;
 
+/// A finding as one of its channels shows it.
 #[derive(Debug, Clone, Copy)]
 pub struct ShownEffect<'a> {
     pub channel: &'a str,
@@ -11,6 +12,7 @@ pub struct ShownEffect<'a> {
 }
 
 /// The finding at `index`, in the order of its channels.
+#[must_use]
 pub fn shown_effects(report: &Report, index: usize) -> Vec<ShownEffect<'_>> {
     let of_channel = |name: &String| {
         let channel = report.channels.iter().find(|channel| channel.name == *name)?;
