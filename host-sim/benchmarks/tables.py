@@ -8,6 +8,7 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from statistics import fmean, stdev
 from typing import Any
 
 STRONG = 2.0  # strength in detection limits from which an effect must be named
@@ -233,64 +234,75 @@ def filters(result: dict[str, Any]) -> None:
 
 
 def losses(result: dict[str, Any]) -> None:
-    print(f"{result['records']} records of {result['samples'] / result['rate_hz'] / 3600:.2f} h at {result['rate_hz']} SPS for each noise\n")
+    noises = result["noises"]
+    print(f"{len(noises[0]['complete'])} records of {result['samples'] / result['rate_hz'] / 3600:.2f} h at {result['rate_hz']} SPS for each noise\n")
     print("Variance over that of the complete record, minus 1, in %: the octave that is farthest from 0, and its standard error;")
     print("in brackets without the correction; smallest degrees of freedom over the complete ones\n")
 
-    def worst(octaves: list[dict[str, Any]], low: float, high: float) -> str:
-        own = [octave for octave in octaves if low <= octave["n"] <= high]
-        if not own:
-            return ""
-        scale = (lambda octave: octave["standard_error"]) if math.isinf(high) else (lambda _: 1.0)
-        of = max(own, key=lambda octave: abs(octave["bias"] / scale(octave)))
-        bias, error, uncorrected = (100 * of[key] for key in ("bias", "standard_error", "uncorrected"))
-        return f"{bias:+.2f} ± {error:.2f} ({uncorrected:+.2f}) {min(octave['edf'] for octave in own):.3f}"
+    def standard_error(values: list[float]) -> float:
+        return stdev(values) / len(values) ** 0.5
 
-    compared = result["comparisons"]
-    table(
-        ["noise", "lost", "%", "same longest τ", *(name for name, _, _ in SAMPLES)],
-        (
-            [of["noise"], of["loss"], f"{100 * of['lost']:.2f}", of["same_longest"]]
-            + [worst(of["octaves"], low, high) for _, low, high in SAMPLES]
-            for of in compared
-        ),
-    )
+    def worst(pairs: list[tuple[Any, Any]], low: float, high: float) -> str:
+        octaves = []
+        for at, octave in enumerate(pairs[0][0]["octaves"]):
+            own = [(a["octaves"][at], b["octaves"][at]) for a, b in pairs if at < min(len(a["octaves"]), len(b["octaves"]))]
+            if own and low <= octave["n"] <= high:
+                mean = fmean(a["avar"] for a, _ in own)
+                changes = [b["avar"] - a["avar"] for a, b in own]
+                bias, error = fmean(changes) / mean, standard_error(changes) / mean
+                edf = fmean(b["edf"] for _, b in own) / fmean(a["edf"] for a, _ in own)
+                octaves.append((bias, error, bias + fmean(b["interpolation"] for _, b in own) / mean, edf))
+        if not octaves:
+            return ""
+        bias, error, uncorrected, _ = max(octaves, key=lambda of: abs(of[0] / (of[1] if math.isinf(high) else 1.0)))
+        return f"{100 * bias:+.2f} ± {100 * error:.2f} ({100 * uncorrected:+.2f}) {min(of[3] for of in octaves):.3f}"
+
+    compared = [(of["noise"], loss, list(zip(of["complete"], lossy))) for of in noises for loss, lossy in of["lossy"]]
+    rows = []
+    for noise, loss, pairs in compared:
+        lost = 1 - sum(b["samples"] for _, b in pairs) / sum(a["samples"] for a, _ in pairs)
+        same = sum(len(a["octaves"]) == len(b["octaves"]) for a, b in pairs)
+        rows.append([noise, loss, f"{100 * lost:.2f}", same, *(worst(pairs, low, high) for _, low, high in SAMPLES)])
+    table(["noise", "lost", "%", "same longest τ", *(name for name, _, _ in SAMPLES)], rows)
     print("Fitted coefficients, % of the truth: the change by the losses ± its standard error, scatter and bias of the complete")
     print("records; records of which the 95 % interval holds the truth, with and without losses\n")
-    table(
-        ["noise", "lost", "", "change", "scatter", "bias", "hold", "complete"],
-        (
-            [of["noise"], of["loss"], c["symbol"], f"{100 * c['shift']:+.3f} ± {100 * c['standard_error']:.3f}"]
-            + [f"{100 * c['scatter']:.3g}", f"{100 * c['complete_bias']:+.2f}", c["covered"], c["complete_covered"]]
-            for of in compared
-            for c in of["coefficients"]
-        ),
-    )
+    rows = []
+    for noise, loss, pairs in compared:
+        for at, of in enumerate(pairs[0][0]["coefficients"]):
+            own = [(a["coefficients"][at], b["coefficients"][at]) for a, b in pairs]
+            values = [a["value"] for a, _ in own]
+            changes = [b["value"] - a["value"] for a, b in own]
+            hold = [sum(one["low"] <= 1 <= one["high"] for one in column) for column in zip(*own)]
+            row = [f"{100 * fmean(changes):+.3f} ± {100 * standard_error(changes):.3f}", f"{100 * stdev(values):.3g}"]
+            rows.append([noise, loss, of["symbol"], *row, f"{100 * fmean(values) - 100:+.2f}", hold[1], hold[0]])
+    table(["noise", "lost", "", "change", "scatter", "bias", "hold", "complete"], rows)
 
 
 def paper(result: dict[str, Any]) -> None:
-    print(f"{result['seeds']} simulated hours of gyro z at 204.8 SPS, default filter, ±300 °/s\n")
+    hours, truth = result["hours"], result["truth"]
+    print(f"{len(hours)} simulated hours of gyro z at 204.8 SPS, default filter, ±300 °/s\n")
     print("Bias ± scatter of the coefficients, % of the truth\n")
-    methods = ("plain", "overlapped", "fitted")
     rows = []
     for at, symbol in enumerate("NBK"):
-        errors = (result[method][at] for method in methods)
-        scatter = (f"{100 * error['bias']:+.1f} ± {100 * error['scatter']:.1f}" for error in errors)
-        low, high = result["intervals_s"][at]
-        first = [symbol, f"{result['truth'][at]:.3g}", f"{low} … {high}", f"{100 * result['inherent'][at]:+.1f}"]
-        rows.append([*first, *scatter, f"{100 * result['covered'][at]:.0f} %"])
+        columns = ([of(hour)[at] / truth[at] for hour in hours] for of in (lambda h: h["slopes"][0], lambda h: h["slopes"][1], lambda h: h["fitted"]))
+        errors = (f"{100 * fmean(of) - 100:+.1f} ± {100 * stdev(of):.1f}" for of in columns)
+        low, high = (result["intervals_s"][at][end] for end in ("start", "end"))
+        first = [symbol, f"{truth[at]:.3g}", f"{low} … {high}", f"{100 * result['inherent'][at]:+.1f}"]
+        rows.append([*first, *errors, f"{100 * fmean(hour['covered'][at] for hour in hours):.0f} %"])
     table(["", "truth", "interval, s", "true curve", "slopes", "overlapped", "fit", "fit covers"], rows)
     print("True curve: slope method on the true curve, without estimation noise. It attributes the curve to one term, but N, B")
     print("and K add up: their fractions of the variance are below.\n")
     print("Standard deviation of the Allan deviation at an octave, %: predicted, and over the seeds\n")
-    predicted = ("formula", "plain", "confidence", "overlapped")
-    table(
-        ["τ, s", "formula (6)", "not overlapped", "by edf", "overlapped", "N, %", "B, %", "K, %"],
-        (
-            [f"{of['tau_s']:.3g}", *(f"{100 * of[key]:.2f}" for key in predicted), *(f"{100 * part:.1f}" for part in of["shares"])]
-            for of in result["scatter"]
-        ),
-    )
+
+    def scatter(method: int, at: int) -> float:
+        deviations = [hour["deviations"][method][at] for hour in hours]
+        return stdev(deviations) / fmean(deviations)
+
+    rows = []
+    for at, of in enumerate(result["octaves"]):
+        parts = (of["formula"], scatter(0, at), of["confidence"], scatter(1, at))
+        rows.append([f"{of['tau_s']:.3g}", *(f"{100 * part:.2f}" for part in parts), *(f"{100 * part:.1f}" for part in of["shares"])])
+    table(["τ, s", "formula (6)", "not overlapped", "by edf", "overlapped", "N, %", "B, %", "K, %"], rows)
     four_methods(result["four_methods"], result["truth"])
 
 
@@ -316,8 +328,7 @@ def four_methods(record: dict[str, Any], truth: list[float]) -> None:
     print("Kalman innovations on the second half, models fitted to the first half\n")
     rows = []
     for test in record["innovations"]:
-        low, high = test["consistent"]
-        tested = [f"{test['normalised']:.3f}", f"{low:.3f} … {high:.3f}", f"{test['correlation']:.3f}"]
+        tested = [f"{test['normalised']:.3f}", f"{test['low']:.3f} … {test['high']:.3f}", f"{test['correlation']:.3f}"]
         rows.append([test["model"], *tested, f"{test['whiteness_p']:.1e}"])
     table(["model", "normalised variance", "95 % if true", "correlation", "p (white)"], rows)
 

@@ -31,6 +31,8 @@ use std::path::{Path, PathBuf};
 
 /// Most rows that a quick report keeps in memory; they give the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
+/// Most sensors of a file that are named in a line.
+const MOST_NAMED: usize = 4;
 /// Longest profile file.
 const PROFILE_BYTES: u64 = 1 << 20;
 
@@ -53,9 +55,12 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         );
     }
     let names: Vec<String> = sensors.iter().map(sensor_name).collect();
-    let mut reading = SeveralReadings::default();
+    let mut reading = SeveralReadings::of_sensors(&sensors);
     let still: Vec<Measurement> = sensors.iter().map(|sensor| reading.read(sensor)).collect::<Result<_>>()?;
-    note(format_args!("recordings: {}", Printable(&names.join(", "))));
+    match names.len() {
+        0..=MOST_NAMED => note(format_args!("recordings: {}", Printable(&names.join(", ")))),
+        many => note(format_args!("recordings: {many} sensors, in the order of `inspect`")),
+    }
     if are_parts(&still) {
         write_parts(still, &names, output, &outputs)?;
     } else {
@@ -75,12 +80,29 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
 #[derive(Debug, Default)]
 pub(crate) struct SeveralReadings {
     incomplete: usize,
+    /// Columns that are read by one of them.
+    columns: Vec<String>,
+    /// Notes that were printed.
+    told: Vec<String>,
 }
 
 impl SeveralReadings {
-    /// Reads all samples of a recording into memory.
+    /// Readings of the sensors of one file.
+    fn of_sensors(sensors: &[RecordingArguments]) -> Self {
+        let assignments = sensors.iter().flat_map(|sensor| &sensor.input.columns);
+        let columns = assignments.filter_map(|text| Some(text.split_once('=')?.1.to_owned())).collect();
+        Self { columns, ..Self::default() }
+    }
+
+    /// Reads all samples of a recording into memory. A note is printed once, and names no column that another one reads.
     pub(crate) fn read(&mut self, recording: &RecordingArguments) -> Result<Measurement> {
-        let read = read_or_ask(recording, open_measured)?;
+        let OpenStream { stream: read, notes, .. } = read_or_ask(recording, open_measured)?;
+        for note in notes.iter().filter_map(|note| note_without(note, &self.columns)) {
+            if !self.told.contains(&note) {
+                note_all(std::slice::from_ref(&note));
+                self.told.push(note);
+            }
+        }
         self.incomplete += usize::from(!read.rows_read().is_complete());
         Ok(read.into_beginning())
     }
@@ -117,7 +139,7 @@ fn write_parts(
         if !output.quiet && !output.prints_to_standard_output() {
             output::show_screen(&report, Some(name))?;
         }
-        saved.push(SavedReport::from(&report));
+        saved.push(SavedReport::new(&report)?);
     }
     let Some(joined) = SavedReport::joined(saved)? else { return Ok(()) };
     let write = |(format, file): (ExportFormat, PathBuf)| write_noise(&joined, format, &file, output.axis, outputs);
@@ -201,8 +223,30 @@ fn analyze_stream(stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStrea
     Ok(progress::analysing(|watch| samples.analyze(watch)))
 }
 
+/// Most columns that a note names on the screen.
+const MOST_COLUMNS: usize = 8;
+/// Before the names in a note on many columns.
+const THEY_ARE: &str = ". They are ";
+const NOT_NAMED: &str = " left out: --columns does not name it";
+
+/// Prints notes, many names as a number.
 fn note_all(notes: &[String]) {
-    notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
+    notes.iter().for_each(|sentence| match sentence.split_once(THEY_ARE) {
+        Some((sentence, _)) => note(format_args!("{sentence} (`inspect`, .json and .html have their names)")),
+        None => note(format_args!("{sentence}")),
+    });
+}
+
+/// A note without the columns that are `read` by another recording of the file; `None` if no column is left.
+fn note_without(note: &str, read: &[String]) -> Option<String> {
+    let (head, many) = note.split_once(THEY_ARE).map_or((note, None), |(head, names)| (head, Some(names)));
+    let Some(few) = head.strip_suffix(NOT_NAMED).filter(|_| !read.is_empty()) else { return Some(note.to_owned()) };
+    let names: Vec<&str> = many.unwrap_or(few).split(", ").filter(|name| !read.iter().any(|of| of == name)).collect();
+    match names.len() {
+        0 => None,
+        1..=MOST_COLUMNS => Some(format!("{}{NOT_NAMED}", names.join(", "))),
+        count => Some(format!("{count} columns{NOT_NAMED}{THEY_ARE}{}", names.join(", "))),
+    }
 }
 
 /// Opens a recording of any format, or the part of it that the arguments select.
@@ -212,12 +256,11 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
     opened.map_err(|error| named(error, &recording.input.file))
 }
 
-/// Reads all samples of a recording into memory, and prints notes for the user.
-fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
-    let OpenStream { stream, notes, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
-    note_all(&notes);
-    note_all(stream.rows_read().damage.as_slice());
-    Ok(stream)
+/// Reads all samples of a recording into memory.
+fn open_measured(recording: &RecordingArguments) -> Result<OpenStream> {
+    let opened = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
+    note_all(opened.stream.rows_read().damage.as_slice());
+    Ok(opened)
 }
 
 /// Replays a table of register counts or a frame log over the emulated bus, and analyses what the driver reads; false if the
@@ -287,7 +330,9 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
 
 /// Reads the samples of a recording of any format on their time base, and prints notes for the user.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
-    Ok(open_measured(arguments)?.into_beginning())
+    let OpenStream { stream, notes, .. } = open_measured(arguments)?;
+    note_all(&notes);
+    Ok(stream.into_beginning())
 }
 
 /// The profile of a known sensor, or of a profile file; `range` is the gyro range of an ADIS16405.

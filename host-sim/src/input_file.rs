@@ -49,7 +49,7 @@ impl Reports {
         }
         let analysed = read_or_ask(recording, |recording| watched_report(recording, false))?;
         self.has_incomplete |= !analysed.is_complete();
-        Ok(SavedReport::from(&analysed.report))
+        Ok(SavedReport::new(&analysed.report)?)
     }
 
     /// An error if a recording was not read to its end.

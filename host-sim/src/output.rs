@@ -16,7 +16,6 @@ use reports::terminal::Screen;
 use reports::{full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
-use std::cell::LazyCell;
 use std::fmt;
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
@@ -96,7 +95,7 @@ pub(crate) fn write_report(
 ) -> Result<()> {
     let Analysed { report, reading } = analysed;
     let (mut written, mut pages) = (Ok(()), Vec::new());
-    let saved = LazyCell::new(|| SavedReport::from(report));
+    let noise = |format, file: &Path| write_noise(&SavedReport::new(report)?, format, file, output.axis, files);
     for target in &output.outputs {
         let OutputFile { format, file } = target;
         let result = match format {
@@ -108,7 +107,7 @@ pub(crate) fn write_report(
             OutputFormat::Figures => figure::pictures(report)
                 .into_iter()
                 .try_for_each(|Picture { name, svg }| write_text(&svg, &figure_file(file, &name), files)),
-            OutputFormat::Noise(format) => write_noise(&saved, *format, file, output.axis, files),
+            OutputFormat::Noise(format) => noise(*format, file),
         };
         written = written.and(result);
     }

@@ -5,8 +5,6 @@ use std::num::NonZeroUsize;
 /// Most recordings of a benchmark. Each has its own seed, and its result is kept until the end.
 pub const MOST_RECORDINGS: u64 = 100_000;
 
-/// The number of cores, or 1 if the machine does not report it.
-#[must_use]
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }

@@ -27,7 +27,6 @@ pub struct ContradictionPlan {
     pub jobs: usize,
 }
 
-/// The report of one record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ContradictedRecord {
     pub seed: u64,
@@ -35,7 +34,6 @@ pub struct ContradictedRecord {
     pub sentences: Vec<String>,
 }
 
-/// The records, in the order of their seeds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ContradictionTable {
     pub records: Vec<ContradictedRecord>,

@@ -7,28 +7,25 @@
 //! The noises follow their definitions at the sensor's own rate: white N², flicker B²/(πf) (one-sided), a walk of white
 //! steps. The true N is the density far below the reading rate, with folded noise and without rounding (0.1 %).
 
-mod table;
-
-pub use table::{FilterCell, FilteredChannel, FilteredCoefficient, FilteredNoiseTable};
-
 use crate::arguments::{MOST_RECORDINGS, cores, in_filter, jobs, positive};
 use crate::parallel;
-use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
+use crate::reproduction::TRUTH;
+use crate::spectral_noise::{baseline, moving_average};
 use clap::{Args, value_parser};
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, Parameter};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use virtual_sensor::ChannelNoise;
 
 /// Rate of the sensor's own samples by the data sheet, Hz.
 const INTERNAL_RATE_HZ: f64 = 819.2;
 /// Size of a count of a gyro by the data sheet, °/s.
 const RESOLUTION: f64 = 0.05;
-/// N in °/√s, B in °/s and K in °/s/√s of the published characterisation (docs/paper.md).
-const COEFFICIENTS: [f64; 3] = [0.0368, 0.0093, 0.0013];
 /// Taps of each of the two averages.
 const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
 /// Decimations: every 1st, 2nd, 4th or 9th value is read.
@@ -58,9 +55,41 @@ pub struct FilteredNoisePlan {
     pub jobs: usize,
 }
 
+/// An estimate with 95 % bounds; the value and the lower bound are 0 if it is not significant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FilteredCoefficient {
+    pub truth: f64,
+    pub value: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FilteredChannel {
+    /// Taps and decimation in the model.
+    pub filter: Option<[f64; 2]>,
+    /// N, B and K with their truth, if the model has them.
+    pub coefficients: [Option<FilteredCoefficient>; 3],
+    /// Named effects other than the filter itself.
+    pub named: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FilterCell {
+    /// Taps of each of the two averages.
+    pub taps: usize,
+    /// Decimation: 1 if every value is read.
+    pub every: usize,
+    pub channels: Vec<FilteredChannel>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FilteredNoiseTable {
+    pub cells: Vec<FilterCell>,
+}
+
 impl FilteredNoisePlan {
     /// Runs the benchmark; `progress` gets the numbers of finished and of all records.
-    #[must_use]
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> FilteredNoiseTable {
         let seeds = self.first_seed..self.first_seed + self.records;
         let items: Vec<(u64, usize)> = seeds.flat_map(|seed| self.taps.iter().map(move |taps| (seed, *taps))).collect();
@@ -89,7 +118,7 @@ impl FilteredNoisePlan {
             let truth = truth(taps, every);
             let of = |&name: &&'static str| {
                 let channel = report.channels.iter().find(|of| of.name == name)?;
-                Some(FilteredChannel::new(seed, name, channel, taps, truth))
+                Some(FilteredChannel::new(channel, taps, truth))
             };
             GYROS.iter().filter_map(of).collect()
         };
@@ -98,7 +127,7 @@ impl FilteredNoisePlan {
 }
 
 impl FilteredChannel {
-    fn new(seed: u64, channel: &'static str, report: &ChannelReport, taps: usize, truth: [f64; 3]) -> Self {
+    fn new(report: &ChannelReport, taps: usize, truth: [f64; 3]) -> Self {
         let term = |kind: &str| report.refitted.terms.iter().find(|term| term.kind() == kind);
         let filter = term("filter_bandwidth");
         let parameter = |name: &str| filter.map(|term| term.parameters()[name].value);
@@ -112,8 +141,6 @@ impl FilteredChannel {
         let is_filter = |kind: &str| taps > 1 && kind == "filter_bandwidth";
         let kinds = report.effects.iter().map(|shown| shown.effect.name().to_owned());
         Self {
-            seed,
-            channel,
             filter: parameter("taps").zip(parameter("decimation")).map(|(taps, decimation)| [taps, decimation]),
             coefficients: std::array::from_fn(coefficient),
             named: kinds.filter(|kind| !is_filter(kind)).collect(),
@@ -121,30 +148,12 @@ impl FilteredChannel {
     }
 }
 
-/// The noise of a channel at the sensor's own rate, °/s.
 fn noise(samples: usize, seed: u64, channel: u64) -> Vec<f64> {
-    let [n, b, k] = COEFFICIENTS;
+    let [angle_random_walk, bias_instability, rate_random_walk] = TRUTH;
+    let noise = ChannelNoise { angle_random_walk, bias_instability, rate_random_walk, ..ChannelNoise::default() };
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(channel);
-    let mut values = gaussian_noise(|frequency| flicker_density(b, frequency), INTERNAL_RATE_HZ, samples, &mut random);
-    let (white, step) = (n * INTERNAL_RATE_HZ.sqrt(), k / INTERNAL_RATE_HZ.sqrt());
-    let mut walk = 0.0;
-    for value in &mut values {
-        walk += step * normal(&mut random);
-        *value += white * normal(&mut random) + walk;
-    }
-    values
-}
-
-fn moving_average(values: &[f64], taps: usize) -> Vec<f64> {
-    let mut sum: f64 = values[..taps - 1].iter().sum();
-    let mean = |at: usize| {
-        sum += values[at];
-        let mean = sum / taps as f64;
-        sum -= values[at + 1 - taps];
-        mean
-    };
-    (taps - 1..values.len()).map(mean).collect()
+    baseline(&noise, INTERNAL_RATE_HZ, samples, &mut random)
 }
 
 fn measurement(filtered: &[Vec<f64>], every: usize) -> Measurement {
@@ -173,7 +182,7 @@ fn measurement(filtered: &[Vec<f64>], every: usize) -> Measurement {
 /// N, B and K of the values that are read. N² is multiplied by `d·Σ r(jd)` with the autocorrelation `r` of the impulse
 /// response.
 fn truth(taps: usize, every: usize) -> [f64; 3] {
-    let [n, b, k] = COEFFICIENTS;
+    let [n, b, k] = TRUTH;
     let box_response = vec![1.0 / taps as f64; taps];
     let response = convolution(&box_response, &box_response);
     let reversed: Vec<f64> = response.iter().rev().copied().collect();
@@ -201,7 +210,7 @@ mod tests {
     /// 9·Σh².
     #[test]
     fn the_white_noise_that_is_read_has_its_closed_form() {
-        let ratio = |taps: usize, every: usize| (truth(taps, every)[0] / COEFFICIENTS[0]).powi(2);
+        let ratio = |taps: usize, every: usize| (truth(taps, every)[0] / TRUTH[0]).powi(2);
         assert!((ratio(1, 9) - 9.0).abs() < 1e-12 && (ratio(8, 4) - 1.0).abs() < 1e-12);
         assert!((ratio(4, 9) - 9.0 * 33.0 / 192.0).abs() < 1e-12);
     }
@@ -216,7 +225,7 @@ mod tests {
         let mean = filtered.iter().sum::<f64>() / filtered.len() as f64;
         let variance = filtered.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / filtered.len() as f64;
         let squares = (2.0 * 64.0 + 1.0) / (3.0 * 512.0);
-        let expected = COEFFICIENTS[0].powi(2) * INTERNAL_RATE_HZ * squares;
+        let expected = TRUTH[0].powi(2) * INTERNAL_RATE_HZ * squares;
         assert!((variance / expected - 1.0).abs() < 0.05, "{variance}, {expected}");
     }
 

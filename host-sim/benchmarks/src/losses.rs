@@ -2,22 +2,21 @@
 //!
 //! ```text
 //! seed ─► noise ─► complete record ─► Cascade ─► curve, N, B, K ─┐
-//!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► ratios, degrees of freedom, intervals ─► JSON ─► tables.py
+//!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► JSON ─► tables.py: ratios, degrees of freedom, intervals
 //! ```
 
 mod estimate;
 mod loss_pattern;
 mod noise;
-mod table;
 
-pub use estimate::EstimatedRecord;
+pub use estimate::{EstimatedCoefficient, EstimatedOctave, EstimatedRecord};
 pub use loss_pattern::LossPattern;
 pub use noise::{RATE_HZ, TestNoise};
-pub use table::{CoefficientComparison, LossComparison, LossTable, OctaveRatio};
 
 use crate::arguments::{MOST_RECORDINGS, cores, jobs};
 use crate::parallel;
 use clap::{Args, value_parser};
+use serde::Serialize;
 use std::convert::Infallible;
 
 /// Take samples out of records and compare variance and coefficients with those of the complete records.
@@ -37,23 +36,36 @@ pub struct LossPlan {
     pub jobs: usize,
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LossTable {
+    pub rate_hz: f64,
+    /// Of a complete record.
+    pub samples: usize,
+    pub noises: Vec<LossyNoise>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LossyNoise {
+    pub noise: String,
+    pub complete: Vec<EstimatedRecord>,
+    /// The same records with losses of each pattern.
+    pub lossy: Vec<(String, Vec<EstimatedRecord>)>,
+}
+
 impl LossPlan {
     /// Runs the benchmark; `progress` gets the numbers of finished and of all records.
-    #[must_use]
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> LossTable {
         let seeds = self.first_seed..self.first_seed + self.records;
         let items: Vec<(TestNoise, u64)> =
-            TestNoise::ALL.into_iter().flat_map(|noise| seeds.clone().map(move |seed| (noise, seed))).collect();
+            TestNoise::all().into_iter().flat_map(|noise| seeds.clone().map(move |seed| (noise, seed))).collect();
         let work = |&(noise, seed): &(TestNoise, u64)| Ok::<_, Infallible>((noise, self.record(noise, seed)));
         let Ok(results) = parallel::map(&items, self.jobs, work, progress);
-        let mut comparisons = Vec::new();
-        for of_noise in results.chunk_by(|(a, _), (b, _)| a == b) {
-            for (index, pattern) in LossPattern::ALL.into_iter().enumerate() {
-                let pairs: Vec<_> = of_noise.iter().map(|(_, records)| (&records[0], &records[index + 1])).collect();
-                comparisons.push(LossComparison::new(of_noise[0].0, pattern, &pairs));
-            }
-        }
-        LossTable { records: self.records, rate_hz: RATE_HZ, samples: self.samples(), comparisons }
+        let noises = results.chunk_by(|(a, _), (b, _)| a == b).map(|of_noise| {
+            let column = |index: usize| of_noise.iter().map(|(_, records)| records[index].clone()).collect();
+            let lossy = (1..).zip(LossPattern::ALL).map(|(index, pattern)| (pattern.to_string(), column(index)));
+            LossyNoise { noise: of_noise[0].0.to_string(), complete: column(0), lossy: lossy.collect() }
+        });
+        LossTable { rate_hz: RATE_HZ, samples: self.samples(), noises: noises.collect() }
     }
 
     fn samples(&self) -> usize {

@@ -1,13 +1,12 @@
 //! The program `benchmarks`: runs a benchmark and writes its result as JSON, of which `tables.py` makes tables.
 
 use anyhow::{Context, Result};
-use benchmarks::arguments::{MOST_RECORDINGS, cores, jobs, positive};
 use benchmarks::contradictions::ContradictionPlan;
 use benchmarks::filtered_noise::FilteredNoisePlan;
 use benchmarks::losses::LossPlan;
 use benchmarks::reproduction::Reproduction;
-use benchmarks::undeclared::{MeasuredNoisePlan, NoiseRecording, StretchLength, UndeclaredPlan};
-use clap::{Args, Parser, Subcommand, value_parser};
+use benchmarks::undeclared::{MeasuredNoisePlan, UndeclaredPlan};
+use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fs::OpenOptions;
@@ -29,40 +28,11 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Benchmark {
     Undeclared(UndeclaredPlan),
-    Measured(MeasuredArguments),
+    Measured(MeasuredNoisePlan),
     Contradictions(ContradictionPlan),
     Filters(FilteredNoisePlan),
     Paper(Reproduction),
     Losses(LossPlan),
-}
-
-/// Hide effects in the measured noise of recordings and score how well the analysis names them.
-#[derive(Debug, Args)]
-struct MeasuredArguments {
-    /// Recordings of any format that `analyze` reads; of those that are no register counts, the longest part at rest.
-    #[arg(required = true)]
-    recordings: Vec<PathBuf>,
-    /// Sample rate of those without time stamps, Hz.
-    #[arg(long)]
-    rate: Option<f64>,
-    /// Stretches, in each of which every kind of effect is hidden alone; they are taken from the recordings in turn.
-    #[arg(long, default_value_t = 6, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
-    stretches: u64,
-    /// Length of a stretch, s; a shorter recording is one stretch.
-    #[arg(long, default_value_t = 600.0, value_parser = positive)]
-    seconds: f64,
-    /// The same in samples, for recordings of different rates.
-    #[arg(long, conflicts_with = "seconds", value_parser = value_parser!(u64).range(1..))]
-    samples: Option<u64>,
-    /// Size of each effect over the detection limit in the noise of its channel.
-    #[arg(long, default_value_t = 3.0, value_parser = positive)]
-    strength: f64,
-    /// Seed of the first stretch.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
-    /// Stretches that are examined at a time [default: one a core].
-    #[arg(long, default_value_t = cores(), value_parser = jobs, hide_default_value = true)]
-    jobs: usize,
 }
 
 /// Runs the program. The exit code is 0 for success and 1 for an error; the argument parser exits with 2 for wrong
@@ -97,14 +67,7 @@ fn run(Cli { benchmark, output }: Cli) -> Result<()> {
     let end = || bar.finish_and_clear();
     match benchmark {
         Benchmark::Undeclared(plan) => write("undeclared", &plan.run(progress)?, end, output),
-        Benchmark::Measured(arguments) => {
-            let MeasuredArguments { recordings, rate, stretches, seconds, samples, strength, seed, jobs } = arguments;
-            let recordings =
-                recordings.iter().map(|file| NoiseRecording::read(file, rate)).collect::<Result<_, _>>()?;
-            let length = samples.map_or(StretchLength::Seconds(seconds), StretchLength::Samples);
-            let plan = MeasuredNoisePlan { recordings, stretches, length, strength, seed, jobs };
-            write("measured", &plan.run(progress), end, output)
-        }
+        Benchmark::Measured(plan) => write("measured", &plan.run(progress)?, end, output),
         Benchmark::Contradictions(plan) => write("contradictions", &plan.run(progress)?, end, output),
         Benchmark::Filters(plan) => write("filters", &plan.run(progress), end, output),
         Benchmark::Paper(plan) => {
@@ -123,7 +86,6 @@ struct Outcome<'a, T> {
     result: &'a T,
 }
 
-/// Ends the progress bar and writes the result.
 fn write(benchmark: &'static str, result: &impl Serialize, end_progress: impl Fn(), file: Option<&Path>) -> Result<()> {
     end_progress();
     let mut json = serde_json::to_vec_pretty(&Outcome { benchmark, result })?;

@@ -2,7 +2,7 @@
 //! Miletiev, "Error modeling of MEMS ADIS 16405").
 //!
 //! ```text
-//! seed ─► published gyro (virtual sensor) ─► slope method and fit ─► bias and scatter over the seeds
+//! seed ─► published gyro (virtual sensor) ─► slope method and fit ─► tables.py: bias and scatter over the seeds
 //!                                         └► four methods on the record of the first seed
 //! ```
 
@@ -10,7 +10,7 @@ mod bias_and_scatter;
 mod four_methods;
 mod published_gyro;
 
-pub use bias_and_scatter::{OctaveScatter, RelativeError, Reproduction, ReproductionResult};
+pub use bias_and_scatter::{Hour, PredictedScatter, Reproduction, ReproductionResult};
 pub use four_methods::{
     Autocorrelation, FourMethods, InnovationTest, MethodCoefficients, SpectrumOctave, allan_weight,
 };

@@ -29,14 +29,14 @@ pub use effect::EffectKind;
 pub use generator::{Sampling, TrueRecording};
 pub use measured::{
     HiddenKind, MeasuredErrors, MeasuredNoiseError, MeasuredNoisePlan, MeasuredNoiseTable, MeasuredScore,
-    NoiseRecording, StretchLength,
+    NoiseRecording,
 };
 pub use outside::{OutsideEffect, OutsideKind};
 pub use score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
 
 use crate::arguments::{MOST_RECORDINGS, cores, jobs, loss_percent};
 use crate::parallel;
-use clap::{Args, value_parser};
+use clap::{Args, ValueEnum, value_parser};
 use serde::Serialize;
 
 /// Offset of the sealed seeds; earlier ones, 2⁴⁰ … 2⁶², have been used.
@@ -82,7 +82,6 @@ pub struct UndeclaredPlan {
     pub jobs: usize,
 }
 
-/// The scores of all recordings, in the order of the plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreTable {
     pub outcomes: Vec<(RecordingGroup, RecordingScore)>,
@@ -99,7 +98,7 @@ impl UndeclaredPlan {
         });
         let pairs = (0..self.pairs).map(|number| (RecordingGroup::Pair, seed(1, number)));
         let triples = (0..self.triples).map(|number| (RecordingGroup::Triple, seed(64, number)));
-        let outside = OutsideKind::ALL.into_iter().flat_map(|kind| {
+        let outside = OutsideKind::value_variants().iter().flat_map(|&kind| {
             (0..self.outside).map(move |number| (RecordingGroup::Outside(kind), seed(65 + kind as u64, number)))
         });
         nothing.chain(singles).chain(pairs).chain(triples).chain(outside).collect()

@@ -76,7 +76,6 @@ pub(crate) fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String,
 /// Properties that the record does not identify are absent, and `notes` say why.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PartReport {
-    /// Name of the sensor's profile.
     pub name: String,
     /// Rate of the sensor's own sample clock, Hz.
     pub clock: Option<Parameter>,
@@ -137,7 +136,6 @@ pub struct Stretch {
     pub to_s: f64,
 }
 
-/// One output of the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelReport {
     /// The channel's name, such as `gyro_z`.
@@ -255,7 +253,6 @@ pub struct SlopeMethodReport {
     pub rate_random_walk: Option<SlopeMethodValue>,
 }
 
-/// One coefficient by the slope method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SlopeMethodValue {
     pub value: f64,
@@ -266,7 +263,6 @@ pub struct SlopeMethodValue {
     pub to_s: f64,
 }
 
-/// A fitted model and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelReport {
     /// The terms, with their parameters; none of a channel that never changes or has no samples.
@@ -287,7 +283,6 @@ pub struct ModelReport {
     pub events: Option<EventsReport>,
 }
 
-/// One term of a noise model of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermReport {
     /// The term with the 95 % bounds of its coefficient and of its shape.
@@ -402,7 +397,6 @@ impl TermReport {
         self.term.kind.name()
     }
 
-    /// The coefficient.
     #[must_use]
     pub fn coefficient(&self) -> Parameter {
         let FittedTerm { kind, value, low, high, .. } = &self.term;

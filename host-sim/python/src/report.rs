@@ -86,7 +86,9 @@ impl NativeReport {
     fn export(&self, format: &str, axis: &str) -> PyResult<(String, Vec<String>)> {
         let format: ExportFormat = named("format", format)?;
         let axis: AxisChoice = named("axis", axis)?;
-        let exported = export::export(&SavedReport::from(&self.analysed.report), format, axis);
+        let saved =
+            SavedReport::new(&self.analysed.report).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let exported = export::export(&saved, format, axis);
         let exported = exported.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok((exported.text, exported.missing.iter().map(ToString::to_string).collect()))
     }

@@ -6,7 +6,6 @@ use noise_analysis::report::assessment::CoefficientsFrom;
 use noise_analysis::report::{ChannelReport, Report};
 
 /// Empty if the coefficients are as a reader expects.
-#[must_use]
 pub fn coefficient_notes(report: &Report) -> Vec<String> {
     let named = |is_one: &dyn Fn(&ChannelReport) -> bool| {
         let names: Vec<&String> = report.channels.iter().filter(|of| is_one(of)).map(|of| &of.name).collect();

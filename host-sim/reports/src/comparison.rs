@@ -15,17 +15,11 @@ const CONDITIONS: [&str; 2] = ["temp", "supply"];
 /// The lowest point of the measured Allan deviation, which data sheets call in-run bias stability.
 const LOWEST: &str = "lowest_allan_deviation";
 
-/// Why reports cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ComparisonError {
     #[error("{channel} is in {first} in one report and in {second} in the other")]
-    Units {
-        /// Such as `gyro_x`.
-        channel: String,
-        first: String,
-        second: String,
-    },
+    Units { channel: String, first: String, second: String },
     #[error("no coefficient of a channel is in both")]
     Nothing,
     #[error(
@@ -97,7 +91,6 @@ pub fn with_data_sheet(report: &SavedReport) -> Result<Comparison, ComparisonErr
     compared(pairs)
 }
 
-/// A data sheet's value beside what was measured.
 fn exact<'a>(channel: &'a SavedChannel, kind: &'static str, value: f64, measured: Parameter) -> Pair<'a> {
     (channel, kind, BoundedEstimate::exact(value).parameter(measured.unit.clone()), measured)
 }

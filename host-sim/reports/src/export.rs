@@ -10,7 +10,7 @@ pub use exported_file::{AxisChoice, Export, ExportError};
 
 use crate::coefficients::KINDS;
 use crate::saved_report::{SavedChannel, SavedReport};
-use crate::summary::{HIGH_DEVIANCE, deviance_per_point};
+use crate::summary::{HIGH_DEVIANCE, deviance_per_point, is_inertial};
 use std::fmt::Write;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -68,13 +68,9 @@ pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> R
 /// `text` with a comment on failing models after the first line.
 fn warned(text: String, report: &SavedReport, format: ExportFormat) -> String {
     let error = |channel: &SavedChannel| channel.unseen_error.filter(|of| *of > HIGH_DEVIANCE);
-    let is_inertial = |channel: &&SavedChannel| ["gyro_", "accl_"].iter().any(|of| channel.name.starts_with(of));
-    let failing: Vec<String> = report
-        .channels
-        .iter()
-        .filter(is_inertial)
-        .filter_map(|channel| Some(format!("{} {}", channel.name, deviance_per_point(error(channel)?))))
-        .collect();
+    let inertial = report.channels.iter().filter(|channel| is_inertial(&channel.name));
+    let failing = inertial.filter_map(|of| Some(format!("{} {}", of.name, deviance_per_point(error(of)?))));
+    let failing: Vec<String> = failing.collect();
     if failing.is_empty() {
         return text;
     }
@@ -173,7 +169,6 @@ mod tests {
         }
     }
 
-    /// If the interval begins at zero.
     #[test]
     fn a_coefficient_whose_interval_begins_at_zero_is_an_upper_bound() {
         let mut known = report("0.01", "gyro_w");

@@ -44,7 +44,6 @@ const RULES: [(&str, &str, &str); 8] = [
     (".cursor{stroke", "#1c2430", "#e6eaf0"),
 ];
 
-/// A figure of the page or of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Name of its file, without an ending.
@@ -53,7 +52,6 @@ pub struct Picture {
     pub svg: String,
 }
 
-/// The style sheet of the figures, for a light ground, and what changes on a dark one.
 pub(crate) fn style() -> [String; 2] {
     let colours = |ground: usize| {
         let of = |(class, light, dark): &(&str, &str, &str)| {
@@ -77,8 +75,6 @@ fn standalone(plot: &Plot) -> Picture {
     Picture { name: plot.id.clone(), svg: plot.file(&light).into_string() }
 }
 
-/// Every figure of a report, in the order of the page.
-#[must_use]
 pub fn pictures(report: &Report) -> Vec<Picture> {
     let overview = story(report).into_iter().chain(overviews(report));
     let channels = report.channels.iter().flat_map(|channel| channel_plots(report, channel));
@@ -94,8 +90,6 @@ pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plo
         .collect()
 }
 
-/// The Allan deviation of `channel` as an SVG document.
-#[must_use]
 pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
     standalone(&allan_deviation_plot(report, channel)).svg
 }
@@ -124,7 +118,6 @@ pub(crate) fn strongest(report: &Report) -> Option<Plot> {
     Some(Plot { id: "strongest".to_owned(), ..plot })
 }
 
-/// Curves of the gyros and of the accelerometers with models and data sheet.
 pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
     [("gyro_", "gyros"), ("accl_", "accelerometers")]
         .into_iter()
@@ -132,7 +125,6 @@ pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
         .collect()
 }
 
-/// The channels whose names begin with `prefix`; `None` without any.
 fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
     let has_curve = |channel: &&ChannelReport| channel.curve.iter().any(|point| has_logarithm(point.adev));
     let of_prefix = report.channels.iter().filter(|channel| channel.name.starts_with(prefix));
@@ -175,7 +167,6 @@ fn data_sheet_line(sheet: &DataSheetReport, taus: &[f64]) -> Line {
     Line::new("data sheet, mean and ±1 σ over parts", Look::Reference, points).with_bounds(bounds)
 }
 
-/// The stated random walk, minimum, and rate random walk.
 fn stated_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
     let of = |tau: f64| {
         let square = |value: Option<f64>| value.map_or(0.0, |value| value * value);

@@ -5,6 +5,7 @@ use crate::rounding::{NONE, grouped, quantity_digits, significant, span};
 use comfy_table::{Table, presets};
 use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
+use std::collections::BTreeMap;
 
 /// Four significant digits; [`NONE`] if not finite.
 pub fn number(value: f64) -> String {
@@ -16,7 +17,6 @@ pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), number)
 }
 
-/// A percentage with its sign, or [`NONE`].
 pub fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), |value| format!("{} %", number(value)))
 }
@@ -26,22 +26,28 @@ pub fn count(value: u64) -> String {
     grouped(&value.to_string())
 }
 
+/// Counts above 0 with their causes: `repeated 3, no new data 1`.
+pub(crate) fn by_cause(counts: &BTreeMap<String, u64>) -> String {
+    let counted = counts.iter().filter(|(_, samples)| **samples > 0);
+    counted.map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect::<Vec<_>>().join(", ")
+}
+
+/// The same with the cause behind: `3 repeated, 1 no new data`.
+pub(crate) fn of_each_cause<'a>(counts: impl IntoIterator<Item = (&'a String, &'a u64)>) -> String {
+    let counted = counts.into_iter().filter(|(_, samples)| **samples > 0);
+    counted.map(|(cause, samples)| format!("{} {}", count(*samples), words(cause))).collect::<Vec<_>>().join(", ")
+}
+
 /// Lost, refused and replaced samples of a channel in one sentence; empty without any.
 pub fn missing_samples(missing: &MissingSamples) -> String {
-    let refused: Vec<String> =
-        missing.refused.iter().map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
-    let mut parts = Vec::new();
-    if missing.lost > 0 {
-        parts.push(format!("{} samples lost", count(missing.lost)));
-    }
-    if !refused.is_empty() {
-        parts.push(format!("refused: {}", refused.join(", ")));
-    }
-    if parts.is_empty() {
+    let MissingSamples { lost, refused, replaced } = missing;
+    let lost = (*lost > 0).then(|| format!("{} samples lost", count(*lost)));
+    let refused = Some(by_cause(refused)).filter(|text| !text.is_empty()).map(|text| format!("refused: {text}"));
+    let replaced = format!("{} replaced from their neighbours", count(*replaced));
+    if lost.is_none() && refused.is_none() {
         return String::new();
     }
-    parts.push(format!("{} replaced from their neighbours", count(missing.replaced)));
-    parts.join("; ")
+    lost.into_iter().chain(refused).chain([replaced]).collect::<Vec<_>>().join("; ")
 }
 
 /// A duration such as `2 h 46 min 40 s`; four digits below a minute.
@@ -71,7 +77,6 @@ pub fn interval(low: f64, high: f64) -> String {
 }
 
 /// Capitalised, except `σ`.
-#[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| [first.to_ascii_uppercase()].into_iter().chain(letters).collect())
@@ -83,6 +88,11 @@ pub(crate) fn enumerated(parts: &[String]) -> String {
         [one] => one.clone(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
+}
+
+/// The number of places, if there are several, and one of them in words.
+pub(crate) fn counted_places(all: usize, text: &str) -> String {
+    if all == 1 { text.to_owned() } else { format!("{all} places; {text}") }
 }
 
 /// A name of the JSON schema as words: `angle_random_walk` becomes `angle random walk`.
@@ -104,24 +114,16 @@ pub fn parameter_name(name: &str) -> String {
 const WHITE: f64 = 0.01;
 
 /// Consistency of a Kalman filter by the variance and whiteness of its innovations.
-pub fn filter_consistency(innovations: &Innovations) -> &'static str {
-    let white = innovations.whiteness_p >= WHITE;
-    if innovations.normalised > innovations.high {
-        if white {
+pub fn filter_consistency(of: &Innovations) -> &'static str {
+    match (of.normalised > of.high, of.normalised >= of.low, of.whiteness_p >= WHITE) {
+        (true, _, true) => {
             "white, but larger than the model says: a Kalman filter would claim a smaller error than it has"
-        } else {
-            "larger than the model says, and not white: the model is not enough for a filter"
         }
-    } else if innovations.normalised >= innovations.low {
-        if white {
-            "white and as large as the model says: enough for a filter"
-        } else {
-            "as large as the model says, but not white: something with a memory is missing"
-        }
-    } else if white {
-        "white, but smaller than the model says: a Kalman filter would claim a larger error than it has"
-    } else {
-        "smaller than the model says, and not white"
+        (true, _, false) => "larger than the model says, and not white: the model is not enough for a filter",
+        (_, true, true) => "white and as large as the model says: enough for a filter",
+        (_, true, false) => "as large as the model says, but not white: something with a memory is missing",
+        (.., true) => "white, but smaller than the model says: a Kalman filter would claim a larger error than it has",
+        (.., false) => "smaller than the model says, and not white",
     }
 }
 
@@ -143,7 +145,6 @@ pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     (sigma.abs() > FAR_OFF).then(|| format!("{text} ({} sigma)", number(sigma)))
 }
 
-/// Deviations of the channel's models beyond chance, by half.
 pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     let (before, after) = (("before: ", &channel.before), ("after: ", &channel.after));
     let models = if channel.before == channel.after { vec![("", &channel.after)] } else { vec![before, after] };
@@ -155,7 +156,6 @@ pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     models.into_iter().flat_map(told).collect()
 }
 
-/// Recording time for a coefficient within ±20 %.
 pub fn recording_advice(record: &RecordLength) -> String {
     let kind = words(&record.kind);
     match record.more_hours {
@@ -170,7 +170,6 @@ pub fn wrap(text: &str, width: usize) -> String {
     broken(text, width, "  ").join("\n")
 }
 
-/// A table without a frame.
 pub(crate) fn plain_table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING).set_header(header);

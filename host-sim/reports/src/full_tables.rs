@@ -6,8 +6,8 @@ use crate::evidence;
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
-    count, duration, filter_consistency, interval, missing_samples, number, recording_advice, words, worst_deviations,
-    wrap,
+    by_cause, count, duration, filter_consistency, interval, missing_samples, number, recording_advice, words,
+    worst_deviations, wrap,
 };
 use crate::report_tables::{self, ReportTable};
 use crate::rounding::{NONE, Scale, p_value, parameter_magnitude, quantity_digits, unit};
@@ -18,12 +18,10 @@ use noise_analysis::report::assessment::navigation::CALIBRATION_S;
 use noise_analysis::report::{
     ChannelEffect, ChannelReport, Parameter, Report, SlopeMethodReport, SlopeMethodValue, TermReport,
 };
-use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 const WIDTH: u16 = 100;
 
-/// Writes the whole report with the recording's name.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
     let title = format!("{} noise report", summary::part_name(report));
     writeln!(out, "{title}{}", source.map_or_else(String::new, |source| format!("   {source}")))?;
@@ -31,8 +29,10 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     writeln!(out, "sample rate  {}", quantity_digits(report.sample_rate_hz, "Hz", 4))?;
     let length = duration(report.samples as f64 / report.sample_rate_hz);
     writeln!(out, "samples      {} used, {length}", count(report.samples))?;
-    writeln!(out, "dropped      {}", by_cause(&report.dropped))?;
-    writeln!(out, "flagged      {}", by_cause(&report.flagged))?;
+    for (title, counts) in [("dropped", &report.dropped), ("flagged", &report.flagged)] {
+        let counts = Some(by_cause(counts)).filter(|counts| !counts.is_empty());
+        writeln!(out, "{title}      {}", counts.unwrap_or_else(|| "none".to_owned()))?;
+    }
     verdict(report, out)?;
     for channel in &report.channels {
         section(channel, out)?;
@@ -70,7 +70,6 @@ const EXCLUDING: &str = "\
 excluding: without what the first half's rules for spikes and knocks find in the unseen half; the
 models after foretell these in the unseen half as recorded, at the rate of the first half.";
 
-/// The content of the screen, without its limits.
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
     writeln!(out)?;
@@ -100,15 +99,6 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
         contradictions.iter().try_for_each(|text| paragraph(out, &format!("{text}.")))?;
     }
     Ok(())
-}
-
-fn by_cause(counts: &BTreeMap<String, u64>) -> String {
-    if counts.values().all(|&samples| samples == 0) {
-        return "none".to_owned();
-    }
-    let causes = counts.iter().filter(|(_, samples)| **samples > 0);
-    let listed: Vec<String> = causes.map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
-    listed.join(", ")
 }
 
 fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
@@ -151,7 +141,6 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", framed(report_tables::curve(channel)))
 }
 
-/// In a frame.
 fn framed(ReportTable { headings, rows, text_columns }: ReportTable) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED).apply_modifier(modifiers::UTF8_ROUND_CORNERS);

@@ -7,7 +7,6 @@ use noise_analysis::report::{Finding, Parameter, Report, Validation};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A report as JSON has it.
 #[derive(Debug, Serialize)]
 pub struct ReportJson<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -31,8 +30,6 @@ struct FindingJson<'a> {
 }
 
 impl<'a> ReportJson<'a> {
-    /// The JSON with the record of the reading, if there is one.
-    #[must_use]
     pub fn new(report: &'a Report, reading: Option<&'a ReadingRecord>) -> Self {
         let finding = |(index, finding): (usize, &'a Finding)| {
             let Finding { effect, channels, clearest, validated, share_percent, minute_percent } = finding;

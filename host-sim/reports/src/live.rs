@@ -15,7 +15,6 @@ const TABLE_COLUMNS: usize = 80;
 /// Least rows of a screen with the data sheet's row.
 const ROWS_FOR_SHEET: u16 = 30;
 
-/// One curve: the Allan deviation over the averaging time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveCurve {
     pub channel: String,
@@ -24,7 +23,6 @@ pub struct LiveCurve {
     pub points: Vec<(f64, f64)>,
 }
 
-/// The curves that are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CurveGroup {
     #[default]
@@ -33,7 +31,6 @@ pub enum CurveGroup {
 }
 
 impl CurveGroup {
-    #[must_use]
     pub fn other(self) -> Self {
         if self == Self::Gyros { Self::Accelerometers } else { Self::Gyros }
     }
@@ -43,17 +40,13 @@ impl CurveGroup {
     }
 }
 
-/// The content of the live view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LiveView {
-    /// Part, source, samples, length.
     pub headline: String,
     pub sentences: String,
-    /// Coefficients of the gyros and of the accelerometers.
     pub tables: Vec<CoefficientTable>,
     pub curves: Vec<LiveCurve>,
     pub findings: Vec<FindingText>,
-    /// Departures without an explanation.
     pub unexplained: Vec<String>,
     /// Departures from the model, and advice.
     pub advice: Vec<String>,

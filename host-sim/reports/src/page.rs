@@ -20,7 +20,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
-/// The style of the page.
 pub const STYLE: &str = include_str!("page/style.css");
 /// The script of the page, as it stands in its element.
 pub const SCRIPT: &str = include_str!("page/script.js");
@@ -29,13 +28,10 @@ const DEFINITIONS: &str = include_str!("page/definitions.html");
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 /// The report on the recording `source` as a page, with the record of the reading.
-#[must_use]
 pub fn html(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::Whole).into_string()
 }
 
-/// The first screen of that page.
-#[must_use]
 pub fn first_screen(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::FirstScreen).into_string()
 }
@@ -47,7 +43,6 @@ enum Extent {
 }
 
 /// A growing record as a part of a page: verdict, curves, findings and health, as on a terminal's screen.
-#[must_use]
 pub fn live(view: &LiveView) -> String {
     let LiveView { headline, sentences, tables, curves, findings, unexplained, advice, health, status } = view;
     html! {
@@ -70,8 +65,6 @@ pub fn live(view: &LiveView) -> String {
     .into_string()
 }
 
-/// The style sheet of the figures, and what changes in it on dark ground.
-#[must_use]
 pub fn figure_styles() -> [String; 2] {
     figure::style()
 }
@@ -126,7 +119,6 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
     }
 }
 
-/// The file, and rows that are no samples.
 fn what_was_read(reading: &ReadingRecord) -> Markup {
     html! {
         section id="file" aria-label="What was read" {
@@ -136,7 +128,6 @@ fn what_was_read(reading: &ReadingRecord) -> Markup {
     }
 }
 
-/// Gyros, accelerometers, conditions.
 fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     let rank = |channel: &ChannelReport| {
         let known = SENSED.iter().position(|prefix| channel.name.starts_with(prefix));
@@ -160,7 +151,6 @@ fn contents(report: &Report) -> Markup {
     }
 }
 
-/// Trust, N, B and K, next steps.
 fn verdict(report: &Report, reading: Option<&ReadingRecord>) -> Markup {
     let answer = summary::answer(report);
     html! {
@@ -190,7 +180,6 @@ fn unparted(text: &str) -> String {
     text.replace(" %", "\u{a0}%")
 }
 
-/// Advice with links to its findings, and the number of unexplained places.
 fn what_to_do(report: &Report) -> Markup {
     html! {
         @let (advice, for_filter) = (summary::advice(report), summary::for_filter(report));
@@ -227,7 +216,6 @@ fn disagreements(report: &Report) -> Markup {
     }
 }
 
-/// A figure with its values for pointer and keyboard.
 fn drawing(plot: &Plot) -> Markup {
     html! {
         figure id=(plot.id) tabindex="0" aria-label={ (plot.title) ". Arrow keys read the values." } {

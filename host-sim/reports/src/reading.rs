@@ -1,11 +1,9 @@
 //! The record of the reading: rows read and rows left out.
 
-use crate::formatting::count;
-use crate::formatting::words;
+use crate::formatting::{count, of_each_cause};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The reading of a recording.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReadingRecord {
     pub file: String,
@@ -15,7 +13,6 @@ pub struct ReadingRecord {
     pub version: String,
     pub options: Vec<String>,
     pub rows: u64,
-    /// Rows that are no samples, by cause.
     pub left_out: BTreeMap<String, u64>,
     /// False for a part of the file.
     pub complete: bool,
@@ -26,14 +23,12 @@ pub struct ReadingRecord {
 }
 
 /// Rows that are no samples, by cause: `dropped`, outside of the part, and padding.
-#[must_use]
 pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, padding: u64) -> BTreeMap<String, u64> {
     let dropped = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(cause, rows)| (*cause, *rows));
     let causes = dropped.chain([("outside_part", outside_part), ("padding", padding)]);
     causes.filter(|(_, rows)| *rows > 0).map(|(cause, rows)| (cause.to_owned(), rows)).collect()
 }
 
-/// Options of the reading.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ReadingOptions<'a> {
     pub topic: Option<&'a str>,
@@ -54,8 +49,6 @@ pub struct ReadingOptions<'a> {
 }
 
 impl ReadingOptions<'_> {
-    /// The options as typed on the command line.
-    #[must_use]
     pub fn words(&self) -> Vec<String> {
         let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
         let number = |number: Option<f64>| number.map(|number| number.to_string());
@@ -75,14 +68,11 @@ impl ReadingOptions<'_> {
 
 impl ReadingRecord {
     /// A sentence if the reading ended early.
-    #[must_use]
     pub fn incomplete(&self) -> Option<String> {
         let why = self.damage.clone().unwrap_or_else(|| "the reading was stopped".to_owned());
         (!self.complete).then(|| format!("Not read to its end: {why}."))
     }
 
-    /// Lines for the page.
-    #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let options =
             if self.options.is_empty() { String::new() } else { format!(", with {}", self.options.join(" ")) };
@@ -93,11 +83,8 @@ impl ReadingRecord {
             self.program,
             self.version
         )];
-        let left_out: Vec<String> =
-            self.left_out.iter().map(|(cause, rows)| format!("{} {}", count(*rows), words(cause))).collect();
-        if !left_out.is_empty() {
-            lines.push(format!("Rows that are no samples: {}.", left_out.join(", ")));
-        }
+        let left_out = of_each_cause(&self.left_out);
+        lines.extend((!left_out.is_empty()).then(|| format!("Rows that are no samples: {left_out}.")));
         lines.extend(self.incomplete());
         lines.extend(self.notes.iter().map(|note| format!("{note}.")));
         lines.extend(self.sha256.iter().map(|sha256| format!("SHA-256 {sha256}")));

@@ -6,7 +6,6 @@ use crate::summary;
 use noise_analysis::report::assessment::{Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, TermReport};
 
-/// Headings and rows of a table.
 #[derive(Debug)]
 pub(crate) struct ReportTable {
     pub headings: Vec<String>,
@@ -54,7 +53,6 @@ pub(crate) fn errors(channel: &ChannelReport) -> ReportTable {
     ReportTable::new(&headings, 1, models.chain([own_curve]))
 }
 
-/// Coefficients in other units.
 pub(crate) fn units(coefficients: &[Coefficient]) -> ReportTable {
     let row = |coefficient: &Coefficient| {
         let scale = Scale::new([parameter_magnitude(&coefficient.value)], &coefficient.value.unit);

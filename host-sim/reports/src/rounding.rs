@@ -34,7 +34,6 @@ fn fixed(value: f64, decimals: usize) -> String {
     fraction.map_or_else(|| format!("{sign}{whole}"), |fraction| format!("{sign}{whole}.{fraction}"))
 }
 
-/// Thousands separated by commas.
 pub(crate) fn grouped(digits: &str) -> String {
     let is_start = |at: usize| at > 0 && (digits.len() - at).is_multiple_of(3);
     digits.char_indices().flat_map(|(at, digit)| is_start(at).then_some(',').into_iter().chain([digit])).collect()
@@ -65,7 +64,6 @@ fn at_place(value: f64, half_width: f64) -> f64 {
 }
 
 /// An estimate with 95 % bounds: `2.43 ± 0.01`, `24.3 (21 … 27)`, `< 190` for an upper bound, `–` without an estimate.
-#[must_use]
 pub fn estimate(value: f64, low: f64, high: f64) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
@@ -96,7 +94,6 @@ pub(crate) fn is_upper_bound(value: f64, low: f64) -> bool {
 }
 
 /// A number with `digits` significant digits and no exponent.
-#[must_use]
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
@@ -115,20 +112,17 @@ pub fn significant(value: f64, digits: i32) -> String {
 }
 
 /// A number with its sign: `+2.1`, `−3.6`.
-#[must_use]
 pub fn signed(value: f64, digits: i32) -> String {
     format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), digits))
 }
 
 /// A number without trailing zeros: `100`, `8`, `91.4`.
-#[must_use]
 pub fn plain(value: f64, digits: i32) -> String {
     let text = significant(value, digits);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// A number of a column of any magnitude: `100`, `−0.0413`, `−3.92e−4`. An integer has all of its digits.
-#[must_use]
 pub fn compact(value: f64, digits: i32) -> String {
     let is_usual = !value.is_finite() || (1e-3..1e7).contains(&value.abs());
     if value.fract() != 0.0 && is_usual {
@@ -143,7 +137,6 @@ pub fn compact(value: f64, digits: i32) -> String {
 }
 
 /// Two digits; `< 0.001` below.
-#[must_use]
 pub fn probability(p: f64) -> String {
     match p {
         p if !p.is_finite() => NONE.to_owned(),
@@ -153,7 +146,6 @@ pub fn probability(p: f64) -> String {
 }
 
 /// A probability in a sentence: `p = 0.21`, `p < 0.001`.
-#[must_use]
 pub fn p_value(p: f64) -> String {
     let text = probability(p);
     if text.starts_with('<') { format!("p {text}") } else { format!("p = {text}") }
@@ -189,13 +181,10 @@ fn prefixed(magnitude: f64, name: &str) -> (String, f64) {
 }
 
 /// Two digits and a prefix: `0.012 °/s` is `12 m°/s`.
-#[must_use]
 pub fn quantity(value: f64, name: &str) -> String {
     quantity_digits(value, name, 2)
 }
 
-/// A quantity with `digits` significant digits.
-#[must_use]
 pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
@@ -205,7 +194,6 @@ pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
 }
 
 /// Significant digits, two to four, that the interval supports.
-#[must_use]
 pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
     let half_width = (high - low) / 2.0;
     if half_width > 0.0 && half_width.is_finite() && value != 0.0 && value.is_finite() {
@@ -215,22 +203,18 @@ pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
     }
 }
 
-/// A parameter with the digits of its interval, without the interval.
-#[must_use]
 pub fn rounded_quantity(parameter: &Parameter) -> String {
     let &Parameter { value, low, high, ref unit } = parameter;
     quantity_digits(value, unit, supported_digits(value, low, high))
 }
 
 /// A parameter with its interval: `20.70 ± 0.10 Hz`.
-#[must_use]
 pub fn bounded_quantity(parameter: &Parameter) -> String {
     let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
     format!("{} {}", scale.estimate(parameter), scale.unit).trim_end().to_owned()
 }
 
 /// The printed value or upper bound.
-#[must_use]
 pub fn parameter_magnitude(parameter: &Parameter) -> f64 {
     let &Parameter { value, low, high, .. } = parameter;
     if is_upper_bound(value, low) { high } else { value }
@@ -245,21 +229,16 @@ pub struct Scale {
 
 impl Scale {
     /// Fits the largest of `values`, in the unit `name`.
-    #[must_use]
     pub fn new(values: impl IntoIterator<Item = f64>, name: &str) -> Self {
         let finite = values.into_iter().map(f64::abs).filter(|value| value.is_finite());
         let (unit, factor) = prefixed(finite.fold(0.0, f64::max), name);
         Self { unit, factor }
     }
 
-    /// `value` with so many significant digits.
-    #[must_use]
     pub fn number(&self, value: f64, digits: i32) -> String {
         significant(value / self.factor, digits)
     }
 
-    /// A parameter with its bounds.
-    #[must_use]
     pub fn estimate(&self, &Parameter { value, low, high, .. }: &Parameter) -> String {
         let scaled = |of: f64| of / self.factor;
         if value < 0.0 {
@@ -272,14 +251,12 @@ impl Scale {
 }
 
 /// Prefix and factor for the largest of a column's `values`; none from 0.1 on.
-#[must_use]
 pub fn column_prefix(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let largest = values.filter(|value| value.is_finite()).fold(0.0, f64::max);
     if largest >= 0.1 || largest == 0.0 { ("", 1.0) } else { prefix(largest, false) }
 }
 
 /// A duration in one or two units: `20 ms`, `3 h 02 min`, `9 h`.
-#[must_use]
 pub fn span(seconds: f64) -> String {
     if !seconds.is_finite() {
         return NONE.to_owned();

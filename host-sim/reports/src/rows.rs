@@ -25,7 +25,6 @@ pub struct ReportRow {
     pub hours: Option<f64>,
     /// `recording`, `coefficient` or `finding`.
     pub row: String,
-    /// Such as `gyro_z`.
     pub channel: Option<String>,
     /// Such as `angle_random_walk` or `sinusoid`.
     pub kind: Option<String>,
@@ -46,7 +45,6 @@ pub struct ReportRow {
 
 impl ReportRow {
     /// The only row of a recording without a report.
-    #[must_use]
     pub fn failed(recording: &str, reason: &str, version: &str) -> Self {
         Self {
             recording: recording.to_owned(),
@@ -65,7 +63,6 @@ impl ReportRow {
 }
 
 /// The rows of a report on `recording`.
-#[must_use]
 pub fn rows(report: &Report, recording: &str, reading: Option<&ReadingRecord>) -> Vec<ReportRow> {
     let is_complete = reading.is_none_or(|reading| reading.complete);
     let lines = |sentences: &[String]| Some(sentences.join("\n")).filter(|text| !text.is_empty());

@@ -1,14 +1,13 @@
 //! The part of a report that other programs need: sample rate, curves, final models; from JSON (schema 2) or memory.
 
 use crate::coefficients::{KINDS, white_noise};
-use noise_analysis::report::{ChannelReport, CurvePoint, DataSheetReport, ModelReport, Parameter, Report, SCHEMA};
+use noise_analysis::report::{CurvePoint, DataSheetReport, Parameter, Report, SCHEMA};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 
 /// Parameter: N below the corner of a process that replaces white noise.
 const BELOW_CORNER: &str = "white_noise";
 
-/// The noise of a sensor by a report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedReport {
     /// Hz.
@@ -19,10 +18,8 @@ pub struct SavedReport {
     pub other_rates_hz: Vec<f64>,
 }
 
-/// One output of the sensor.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedChannel {
-    /// Such as `gyro_z`.
     pub name: String,
     /// Unit of the deviations, such as `deg/s`.
     pub unit: String,
@@ -34,7 +31,6 @@ pub struct SavedChannel {
     /// Deviance per point of the first half's model on the second, 1 for a true model; absent for short records.
     #[serde(default, rename = "after", deserialize_with = "unseen_error")]
     pub unseen_error: Option<f64>,
-    /// Typical noise by the data sheet, if known.
     pub data_sheet: Option<DataSheetReport>,
 }
 
@@ -47,13 +43,11 @@ pub struct SavedModel {
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedTerm {
-    /// Such as `angle_random_walk`.
     pub kind: String,
     /// By name, as in [`noise_analysis::report::TermReport::parameters`].
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// Reasons to refuse a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedReportError {
@@ -62,11 +56,7 @@ pub enum SavedReportError {
     #[error("schema {0}, where this program reads schema {SCHEMA}")]
     Schema(u64),
     #[error("{path}: {reason}")]
-    Field {
-        /// Such as `channels[3].final`.
-        path: String,
-        reason: serde_json::Error,
-    },
+    Field { path: String, reason: serde_json::Error },
     #[error("{0}: the report contradicts itself; make it anew with `analyze -o report.json`")]
     Contradiction(String),
     #[error("{0} is in both reports; those of one sensor's parts have different channels")]
@@ -84,6 +74,14 @@ fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64
 }
 
 impl SavedReport {
+    /// The part of a report in memory, by its JSON.
+    ///
+    /// # Errors
+    /// A number of the report is not finite.
+    pub fn new(report: &Report) -> Result<Self, SavedReportError> {
+        serde_json::to_value(report).and_then(serde_json::from_value).map_err(SavedReportError::NoReport)
+    }
+
     /// Reads the JSON of `analyze -o report.json`.
     ///
     /// # Errors
@@ -154,7 +152,6 @@ impl SavedReport {
         Ok(joined)
     }
 
-    #[must_use]
     pub fn channel(&self, name: &str) -> Option<&SavedChannel> {
         self.channels.iter().find(|channel| channel.name == name)
     }
@@ -162,7 +159,6 @@ impl SavedReport {
 
 impl SavedChannel {
     /// The coefficient of the term `kind`; N of all white noise, also below the corner of a process that replaces it.
-    #[must_use]
     pub fn coefficient(&self, kind: &str) -> Option<Parameter> {
         let mut terms = self.refitted.terms.iter();
         if kind == KINDS[0] {
@@ -181,40 +177,6 @@ impl SavedTerm {
 
     pub(crate) fn is_in_place_of_white_noise(&self) -> bool {
         self.parameters.contains_key(BELOW_CORNER)
-    }
-}
-
-impl From<&Report> for SavedReport {
-    fn from(report: &Report) -> Self {
-        Self {
-            sample_rate_hz: report.sample_rate_hz,
-            channels: report.channels.iter().map(SavedChannel::from).collect(),
-            other_rates_hz: Vec::new(),
-        }
-    }
-}
-
-impl From<&ChannelReport> for SavedChannel {
-    fn from(channel: &ChannelReport) -> Self {
-        Self {
-            name: channel.name.clone(),
-            unit: channel.unit.clone(),
-            curve: channel.curve.clone(),
-            refitted: SavedModel::from(&channel.refitted),
-            unseen_error: channel.after.unseen.deviance_per_point,
-            data_sheet: channel.figure_data.data_sheet.clone(),
-        }
-    }
-}
-
-impl From<&ModelReport> for SavedModel {
-    fn from(model: &ModelReport) -> Self {
-        let parameters = |(name, of): (&str, Parameter)| (name.to_owned(), of);
-        let terms = model.terms.iter().map(|term| SavedTerm {
-            kind: term.kind().to_owned(),
-            parameters: term.parameters().into_iter().map(parameters).collect(),
-        });
-        Self { terms: terms.collect(), adev: model.adev.clone() }
     }
 }
 

@@ -13,7 +13,6 @@ pub const MOST_LINES: usize = 30;
 const NARROWEST: usize = 80;
 const WIDEST: usize = 200;
 const TEXT: usize = 110;
-/// Columns of label and error.
 const LABEL: usize = 7;
 const ERROR: usize = 17;
 /// Most lines of sentences on the record, and on conditions.
@@ -31,7 +30,6 @@ const WARNING: Style = AnsiColor::Yellow.on_default().bold();
 #[derive(Debug, Clone, Copy)]
 pub struct Screen<'a> {
     pub report: &'a Report,
-    /// Name of the recording, if it has one.
     pub source: Option<&'a str>,
     pub columns: usize,
 }
@@ -53,7 +51,6 @@ impl Screen<'_> {
     }
 
     /// Lines with styles; blocks below the findings are cut to give each finding a line.
-    #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines = self.above();
         let (found, _) = summary::findings(self.report);
@@ -163,13 +160,11 @@ impl Screen<'_> {
     }
 }
 
-/// `texts` beside a heading.
 fn block(heading: &str, texts: &[String], style: Style) -> Vec<String> {
     let labelled = |(index, text): (usize, &String)| {
         let label = if index == 0 { heading } else { "" };
         let space = " ".repeat(CHANNELS.saturating_sub(label.chars().count()));
-        let label = if label.is_empty() { String::new() } else { styled(style, label) };
-        format!("{label}{space}{text}")
+        if label.is_empty() { format!("{space}{text}") } else { format!("{}{space}{text}", styled(style, label)) }
     };
     texts.iter().enumerate().map(labelled).collect()
 }
@@ -207,7 +202,8 @@ pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usi
             line += &padded(cell, width);
         }
         let line = line.trim_end();
-        format!("{line}{}", left_padded(error, total.saturating_sub(line.chars().count()))).trim_end().to_owned()
+        let rest = total.saturating_sub(line.chars().count());
+        format!("{line}{error:>rest$}").trim_end().to_owned()
     };
     let headings: [String; 3] = std::array::from_fn(|index| format!("{}, {}", LETTERS[index], table.units[index]));
     let error = if is_first { "σ off by  " } else { "" };
@@ -235,10 +231,6 @@ fn styled(style: Style, text: &str) -> String {
 
 /// Padded to `width`, at least one space.
 fn padded(text: &str, width: usize) -> String {
-    let space = width.saturating_sub(text.chars().count()).max(usize::from(!text.is_empty()));
-    format!("{text}{}", " ".repeat(space))
-}
-
-fn left_padded(text: &str, width: usize) -> String {
-    format!("{}{text}", " ".repeat(width.saturating_sub(text.chars().count())))
+    let width = width.max(text.chars().count() + usize::from(!text.is_empty()));
+    format!("{text:width$}")
 }

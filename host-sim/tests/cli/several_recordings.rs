@@ -109,3 +109,33 @@ fn each_sensor_of_a_file_is_a_recording() {
     // That the columns are rates is in doubt, and `--each-sensor` takes no guess in doubt.
     assert!(!inspected.contains("--each-sensor"), "{inspected}");
 }
+
+/// Eleven sensors of six columns in a table, and a column that no sensor has: one note, which names no column that another sensor reads.
+#[test]
+fn the_columns_of_the_other_sensors_are_not_told_as_left_out() {
+    let dir = tempdir().expect("a folder");
+    let sensors = (0..11).flat_map(|imu| ["gyro", "accel"].map(|of| (imu, of)));
+    let columns = sensors.flat_map(|(imu, of)| ["x", "y", "z"].map(|axis| (imu, of, axis)));
+    let unit = |of: &str| if of == "gyro" { "rad/s" } else { "m/s^2" };
+    let headings = columns.map(|(imu, of, axis)| format!(",imu{imu}_{of}_{axis} [{}]", unit(of))).collect::<String>();
+    let row = |row: i32| {
+        let values = (0..66).map(|column| format!(",{:.3}", f64::from((row * 7919 + column * 104_729) % 1009) / 1e4));
+        format!("{:.2},0{}\n", f64::from(row) / 100.0, values.collect::<String>())
+    };
+    let table = format!("t [s],lamp{headings}\n{}", (0..1500).map(row).collect::<String>());
+    let file = crate::program::write(&dir, "many.csv", table.as_bytes());
+    let errors = |arguments: &[&str]| {
+        let output = imunoise(&[&["analyze", file.to_str().expect("UTF-8"), "--quiet"], arguments].concat());
+        String::from_utf8(output.stderr).expect("UTF-8")
+    };
+    let together = errors(&["--each-sensor"]);
+    let left_out: Vec<&str> = together.lines().filter(|line| line.contains("left out")).collect();
+    assert_eq!(left_out, ["note: lamp left out: --columns does not name it"], "{together}");
+    assert!(together.lines().all(|line| line.chars().count() < 160), "{together}");
+    let json = dir.path().join("one.json");
+    let alone = errors(&["--columns", "time=t,gyro_x=imu3_gyro_x", "-o", json.to_str().expect("UTF-8")]);
+    let note = "note: 66 columns left out: --columns does not name it (`inspect`, .json and .html have their names)";
+    assert!(alone.lines().any(|line| line == note), "{alone}");
+    let report = std::fs::read_to_string(&json).expect("a report");
+    assert!(report.contains("lamp, imu0_gyro_x, ") && report.contains(", imu10_accel_z"), "{report}");
+}

@@ -6,7 +6,6 @@ use rand_chacha::ChaCha8Rng;
 use std::fmt;
 use std::ops::Range;
 
-/// A pattern of lost samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LossPattern {
     /// Each sample is lost with this probability.
@@ -16,12 +15,10 @@ pub enum LossPattern {
 }
 
 impl LossPattern {
-    /// The patterns of the benchmark.
     pub const ALL: [Self; 5] =
         [Self::Random(0.0005), Self::Random(0.005), Self::Random(0.02), Self::Random(0.05), Self::Bursts];
 
     /// The lost samples; the first and the last sample of a record are kept.
-    #[must_use]
     pub fn gaps(self, samples: usize, seed: u64) -> Vec<Range<usize>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(1);

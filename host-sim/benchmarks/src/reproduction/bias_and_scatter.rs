@@ -22,64 +22,46 @@ pub struct Reproduction {
     pub first_seed: u64,
 }
 
-/// Error over the seeds, as fractions of the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct RelativeError {
-    /// Mean over truth, less 1.
-    pub bias: f64,
-    /// Standard deviation over truth.
-    pub scatter: f64,
-}
-
-/// Relative standard deviation of the Allan deviation at one octave.
+/// An octave of the curve: relative standard deviations of the Allan deviation by theory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OctaveScatter {
+pub struct PredictedScatter {
     pub tau_s: f64,
-    /// Predicted by equation (6) of the paper, `1/√(2(N/n − 1))`.
+    /// By equation (6) of the paper, `1/√(2(N/n − 1))`.
     pub formula: f64,
-    /// Predicted for the overlapped estimate, `1/√(2·edf)`.
+    /// Of the overlapped estimate, `1/√(2·edf)`.
     pub confidence: f64,
-    /// Measured over the seeds, without overlap.
-    pub plain: f64,
-    /// Measured over the seeds, with 8-fold overlap.
-    pub overlapped: f64,
     /// Fractions of N, B and K in the true Allan variance before the filter.
     pub shares: [f64; 3],
 }
 
-/// Errors over all hours, and the four methods on the first hour.
+/// The estimates of all hours, and the four methods on the first hour.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReproductionResult {
-    pub seeds: u64,
     /// N, °/√s, B, °/s, and K, °/s^1.5.
     pub truth: [f64; 3],
     /// Averaging times from which the slope method takes each of them, s.
     pub intervals_s: [RangeInclusive<f64>; 3],
     /// Bias of the slope method on the true curve: its inherent error.
     pub inherent: [f64; 3],
-    /// Error of the slope method without overlap, as in the paper.
-    pub plain: [RelativeError; 3],
-    /// Error of the slope method with 8-fold overlap.
-    pub overlapped: [RelativeError; 3],
-    /// Error of the fit with 8-fold overlap.
-    pub fitted: [RelativeError; 3],
-    /// Fraction of seeds for which the 95 % bounds of the fit contain the truth.
-    pub covered: [f64; 3],
-    pub scatter: Vec<OctaveScatter>,
+    pub hours: Vec<Hour>,
+    pub octaves: Vec<PredictedScatter>,
     pub four_methods: FourMethods,
 }
 
-struct Hour {
-    plain: Vec<f64>,
-    overlapped: Vec<f64>,
-    slopes: [[f64; 3]; 2],
-    fitted: [f64; 3],
-    covered: [bool; 3],
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hour {
+    /// Coefficients by the slope method, without overlap as in the paper and with 8-fold overlap.
+    pub slopes: [[f64; 3]; 2],
+    /// Coefficients by the fit with 8-fold overlap.
+    pub fitted: [f64; 3],
+    /// True where the 95 % bounds of the fit contain the truth.
+    pub covered: [bool; 3],
+    /// Allan deviations by octave, without overlap and with 8-fold overlap.
+    pub deviations: [Vec<f64>; 2],
 }
 
 impl Reproduction {
     /// Simulates and analyses the hours; `progress` gets the number of finished ones.
-    #[must_use]
     pub fn run(&self, mut progress: impl FnMut(u64)) -> ReproductionResult {
         let hours: Vec<Hour> = (0..self.seeds)
             .map(|index| {
@@ -89,26 +71,21 @@ impl Reproduction {
             })
             .collect();
         let truth = true_model();
-        let octaves = (0..hours.iter().map(|hour| hour.plain.len()).min().unwrap_or(0)).map(|octave| 1_u64 << octave);
+        let octaves = hours.iter().map(|hour| hour.deviations[0].len()).min().unwrap_or(0);
+        let octaves = (0..octaves).map(|octave| 1_u64 << octave);
         let tau = |n: u64| n as f64 / RATE_HZ;
         let inherent = slope_coefficients(octaves.clone().map(|n| (tau(n), truth.avar(n).sqrt())));
         ReproductionResult {
-            seeds: self.seeds,
             truth: TRUTH,
             intervals_s: INTERVALS,
-            inherent: relative_errors(inherent),
-            plain: each(|term| error_over(&hours, |hour| hour.slopes[0][term] / TRUTH[term])),
-            overlapped: each(|term| error_over(&hours, |hour| hour.slopes[1][term] / TRUTH[term])),
-            fitted: each(|term| error_over(&hours, |hour| hour.fitted[term] / TRUTH[term])),
-            covered: each(|term| hours.iter().filter(|hour| hour.covered[term]).count() as f64 / hours.len() as f64),
-            scatter: octaves
+            inherent: each(|term| inherent[term].map_or(f64::NAN, |value| value / TRUTH[term] - 1.0)),
+            hours,
+            octaves: octaves
                 .enumerate()
-                .map(|(octave, n)| OctaveScatter {
+                .map(|(octave, n)| PredictedScatter {
                     tau_s: tau(n),
                     formula: allan_core::slope_method::percentage_accuracy(SAMPLES, n) / 100.0,
                     confidence: confidence(&truth, octave),
-                    plain: relative(error_over(&hours, |hour| hour.plain[octave])),
-                    overlapped: relative(error_over(&hours, |hour| hour.overlapped[octave])),
                     shares: each(|term| {
                         let kind = NoiseTerm::BASELINE[term];
                         TRUTH[term] * TRUTH[term] * kind.avar(n, 1.0 / RATE_HZ) / unfiltered(n)
@@ -142,30 +119,14 @@ impl Hour {
             |points: &[AllanPoint]| slope_coefficients(deviations(points)).map(|value| value.unwrap_or(f64::NAN));
         Self {
             slopes: [slopes(plain.points()), slopes(overlapped.points())],
-            plain: deviations(plain.points()).map(|(_, deviation)| deviation).collect(),
-            overlapped: deviations(overlapped.points()).map(|(_, deviation)| deviation).collect(),
             fitted: each(|index| term(index).value),
             covered: each(|index| (term(index).low..=term(index).high).contains(&TRUTH[index])),
+            deviations: [plain.points(), overlapped.points()]
+                .map(|points| deviations(points).map(|(_, deviation)| deviation).collect()),
         }
     }
 }
 
 fn each<T>(value: impl Fn(usize) -> T) -> [T; 3] {
     std::array::from_fn(value)
-}
-
-fn relative_errors(found: [Option<f64>; 3]) -> [f64; 3] {
-    each(|term| found[term].map_or(f64::NAN, |value| value / TRUTH[term] - 1.0))
-}
-
-/// Bias and standard deviation of an estimate over its true value.
-fn error_over(hours: &[Hour], ratio: impl Fn(&Hour) -> f64) -> RelativeError {
-    let count = hours.len() as f64;
-    let mean = hours.iter().map(&ratio).sum::<f64>() / count;
-    let square = hours.iter().map(|hour| (ratio(hour) - mean).powi(2)).sum::<f64>();
-    RelativeError { bias: mean - 1.0, scatter: (square / (count - 1.0)).sqrt() }
-}
-
-fn relative(error: RelativeError) -> f64 {
-    error.scatter / (1.0 + error.bias)
 }

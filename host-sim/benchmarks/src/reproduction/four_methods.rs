@@ -5,6 +5,7 @@ use super::published_gyro::{
 };
 use allan_core::fit::fit;
 use allan_core::{Curve, Model, NoiseTerm};
+use noise_analysis::report::assessment::Innovations;
 use noise_analysis::report::assessment::innovations::filter_innovations;
 use noise_analysis::samples::uniform_series::UniformSeries;
 use noise_analysis::spectra::Welch;
@@ -29,7 +30,6 @@ pub struct MethodCoefficients {
     pub bounds: [Option<(f64, f64)>; 3],
 }
 
-/// Results of the autocorrelation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Autocorrelation {
     /// Variance of the samples, (deg/s)².
@@ -61,17 +61,10 @@ pub struct SpectrumOctave {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InnovationTest {
     pub model: &'static str,
-    /// Mean squared innovation over its expectation.
-    pub normalised: f64,
-    /// Interval that contains `normalised` for 95 % of true models.
-    pub consistent: (f64, f64),
-    /// Correlation of neighbouring innovations.
-    pub correlation: f64,
-    /// p-value of the Ljung-Box test over 20 lags.
-    pub whiteness_p: f64,
+    #[serde(flatten)]
+    pub innovations: Innovations,
 }
 
-/// The results of the four methods.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FourMethods {
     pub seed: u64,
@@ -86,7 +79,6 @@ pub struct FourMethods {
 
 impl FourMethods {
     /// Simulates the record of `seed` and applies the four methods.
-    #[must_use]
     pub fn analyze(seed: u64) -> Self {
         let counts = simulate_counts(seed);
         let samples: Vec<f64> = counts.iter().map(|&count| LSB * f64::from(count)).collect();
@@ -196,7 +188,6 @@ fn spectral_coefficients(welch: &Welch) -> MethodCoefficients {
 ///
 /// The factor is 2, since equation (5) has the two-sided density. A mean of `n` samples has
 /// sin(πfτ)/(n·sin(πf/RATE_HZ)), and the density of the samples includes aliases.
-#[must_use]
 pub fn allan_weight(frequency: f64, n: u64) -> f64 {
     let phase = PI * frequency / RATE_HZ;
     let n = n as f64;
@@ -229,14 +220,7 @@ fn innovation_tests(fitted: &Model, unseen: &UniformSeries) -> Vec<InnovationTes
         fitted.terms().iter().filter(|term| matches!(term.kind, NoiseTerm::Filtered(_) | NoiseTerm::AngleRandomWalk));
     let only_n = Model::new(1.0 / RATE_HZ, white.copied());
     let test = |(name, model): (&'static str, &Model)| {
-        let found = filter_innovations(model, unseen)?;
-        Some(InnovationTest {
-            model: name,
-            normalised: found.normalised,
-            consistent: (found.low, found.high),
-            correlation: found.correlation,
-            whiteness_p: found.whiteness_p,
-        })
+        Some(InnovationTest { model: name, innovations: filter_innovations(model, unseen)? })
     };
     [("N, B, K", fitted), ("N only", &only_n)].into_iter().filter_map(test).collect()
 }

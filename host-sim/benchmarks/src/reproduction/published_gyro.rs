@@ -9,7 +9,6 @@ use virtual_sensor::{NoiseModel, OutputRegister, VirtualAdis16405};
 
 /// N in deg/√s, B in deg/s and K in deg/s^1.5 of gyro z, as printed in the paper.
 pub const TRUTH: [f64; 3] = [0.0368, 0.0093, 0.0013];
-/// Sample rate, Hz.
 pub const RATE_HZ: f64 = 204.8;
 /// Length of the record, s.
 pub const SECONDS: f64 = 3600.0;
@@ -38,7 +37,6 @@ pub(super) fn simulate_counts(seed: u64) -> Vec<i32> {
     (0..SAMPLES).map(|_| next()).collect()
 }
 
-/// The Allan variance curve of the counts, deg/s.
 pub(super) fn allan_curve<const OVERLAP: usize>(counts: &[i32]) -> Curve<OCTAVES> {
     let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
     cascade.push_slice(counts);
@@ -71,7 +69,6 @@ pub const INTERVALS: [RangeInclusive<f64>; 3] = [0.125..=2.0, 32.0..=128.0, 120.
 /// N, B and K by equations (7) to (9) of the paper, fitted to the logarithms: a line read at 1 s, a flat minimum over
 /// 0.664, a line read at 3 s. `points` are averaging times in s with Allan deviations. A coefficient is `None` if no
 /// point is in its interval.
-#[must_use]
 pub fn slope_coefficients(points: impl Iterator<Item = (f64, f64)> + Clone) -> [Option<f64>; 3] {
     // These factors convert an Allan deviation at τ to a coefficient.
     let factors: [fn(f64) -> f64; 3] = [f64::sqrt, |_| (PI / (2.0 * LN_2)).sqrt(), |tau| (3.0 / tau).sqrt()];

@@ -32,7 +32,6 @@ const LARGEST_PART: f64 = 0.1;
 /// Number of draws after which a set with a weak effect is accepted.
 const DRAWS: usize = 100;
 
-/// The groups of recordings in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordingGroup {
@@ -43,7 +42,6 @@ pub enum RecordingGroup {
     Outside(OutsideKind),
 }
 
-/// A recording to be simulated, with its true effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnRecording {
     /// Seed; with length and kinds it determines all other fields.
@@ -57,7 +55,6 @@ pub struct DrawnRecording {
 
 impl DrawnRecording {
     /// The recording of a group and a seed, `seconds` s long.
-    #[must_use]
     pub fn from_group(group: RecordingGroup, seconds: f64, seed: u64) -> Self {
         match group {
             RecordingGroup::Nothing => Self::draw(&[], seconds, seed),
@@ -69,7 +66,6 @@ impl DrawnRecording {
     }
 
     /// A recording, `seconds` s long, with an effect outside the vocabulary of the analysis.
-    #[must_use]
     pub fn draw_outside(kind: OutsideKind, seconds: f64, seed: u64) -> Self {
         let nothing = Self::draw(&[], seconds, seed);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -91,7 +87,6 @@ impl DrawnRecording {
     }
 
     /// A recording, `seconds` s long, with effects of `kinds`.
-    #[must_use]
     pub fn draw(kinds: &[EffectKind], seconds: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX);
@@ -117,7 +112,6 @@ impl DrawnRecording {
     }
 
     /// The kinds of the pair or triple of a seed, all different.
-    #[must_use]
     pub fn several<const KINDS: usize>(seed: u64) -> [EffectKind; KINDS] {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX - 1);

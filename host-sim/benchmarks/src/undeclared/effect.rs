@@ -12,72 +12,45 @@ use virtual_sensor::{InjectedEffect, OutputRegister};
 
 pub(super) const GYROS: [OutputRegister; 3] = [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ];
 
-/// Kind of a hidden effect, a variant of the virtual sensor's effects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
-#[value(rename_all = "snake_case")]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs, reason = "each is documented at the virtual sensor's effect of the same name")]
-pub enum EffectKind {
-    Sinusoid,
-    Resonance,
-    Markov,
-    Telegraph,
-    Quantization,
-    RateRamp,
-    FilterBandwidth,
-    Temperature,
-    Supply,
-    Acceleration,
-    CommonMode,
-    Spikes,
-    BiasStep,
-    DroppedSamples,
-    RepeatedSamples,
-    SampleClock,
+/// Declares [`EffectKind`]: each kind with its name in a report.
+macro_rules! kinds {
+    ($($kind:ident = $name:literal,)*) => {
+        /// Kind of a hidden effect, a variant of the virtual sensor's effects.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
+        #[value(rename_all = "snake_case")]
+        #[serde(rename_all = "snake_case")]
+        #[allow(missing_docs, reason = "each is documented at the virtual sensor's effect of the same name")]
+        pub enum EffectKind { $($kind,)* }
+
+        impl EffectKind {
+            /// Every kind, in the order of the tables.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$kind),*];
+
+            /// The name of this kind in a report.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$kind => $name),* }
+            }
+        }
+    };
 }
 
-impl EffectKind {
-    /// Every kind, in the order of the tables.
-    pub const ALL: [Self; 16] = [
-        Self::Sinusoid,
-        Self::Resonance,
-        Self::Markov,
-        Self::Telegraph,
-        Self::Quantization,
-        Self::RateRamp,
-        Self::FilterBandwidth,
-        Self::Temperature,
-        Self::Supply,
-        Self::Acceleration,
-        Self::CommonMode,
-        Self::Spikes,
-        Self::BiasStep,
-        Self::DroppedSamples,
-        Self::RepeatedSamples,
-        Self::SampleClock,
-    ];
-
-    /// The name of this kind in a report.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sinusoid => "sinusoid",
-            Self::Resonance => "resonance",
-            Self::Markov => "markov",
-            Self::Telegraph => "telegraph",
-            Self::Quantization => "quantization",
-            Self::RateRamp => "rate_ramp",
-            Self::FilterBandwidth => "filter_bandwidth",
-            Self::Temperature => "temperature",
-            Self::Supply => "supply",
-            Self::Acceleration => "acceleration",
-            Self::CommonMode => "common_mode",
-            Self::Spikes => "spikes",
-            Self::BiasStep => "bias_step",
-            Self::DroppedSamples => "dropped_samples",
-            Self::RepeatedSamples => "repeated_samples",
-            Self::SampleClock => "sample_clock",
-        }
-    }
+kinds! {
+    Sinusoid = "sinusoid",
+    Resonance = "resonance",
+    Markov = "markov",
+    Telegraph = "telegraph",
+    Quantization = "quantization",
+    RateRamp = "rate_ramp",
+    FilterBandwidth = "filter_bandwidth",
+    Temperature = "temperature",
+    Supply = "supply",
+    Acceleration = "acceleration",
+    CommonMode = "common_mode",
+    Spikes = "spikes",
+    BiasStep = "bias_step",
+    DroppedSamples = "dropped_samples",
+    RepeatedSamples = "repeated_samples",
+    SampleClock = "sample_clock",
 }
 
 /// An effect of size 1 in `channel`, or in another gyro if the channel is unsuitable.
@@ -139,31 +112,9 @@ pub(super) fn draw_unit(
     }
 }
 
-/// Magnitude of the parameter that [`draw_unit`] sets to 1.
-pub(super) fn size(effect: &InjectedEffect) -> f64 {
-    match *effect {
-        InjectedEffect::Sinusoid { amplitude, .. } | InjectedEffect::Telegraph { amplitude, .. } => amplitude,
-        InjectedEffect::Resonance { deviation, .. }
-        | InjectedEffect::Markov { deviation, .. }
-        | InjectedEffect::CommonMode { deviation, .. } => deviation,
-        InjectedEffect::Quantization { coefficient, .. } => coefficient,
-        InjectedEffect::RateRamp { slope, .. } => slope.abs(),
-        InjectedEffect::FilterBandwidth { .. } => 1.0,
-        InjectedEffect::Temperature { sensitivity, .. } | InjectedEffect::Supply { sensitivity, .. } => {
-            sensitivity.abs()
-        }
-        InjectedEffect::Acceleration { sensitivity, .. } => {
-            sensitivity.iter().map(|part| part * part).sum::<f64>().sqrt()
-        }
-        InjectedEffect::Spikes { size, .. } | InjectedEffect::BiasStep { size, .. } => size.abs(),
-        InjectedEffect::DroppedSamples { fraction } | InjectedEffect::RepeatedSamples { fraction } => fraction,
-        InjectedEffect::SampleClock { ratio } => (ratio - 1.0).abs(),
-    }
-}
-
-/// The effect with its size multiplied by `factor`; a filter's size is fixed.
-pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect {
-    match &mut effect {
+/// The parameter that [`draw_unit`] sets to 1; `None` if it is not one number of its own, or fixed.
+fn size_mut(effect: &mut InjectedEffect) -> Option<&mut f64> {
+    match effect {
         InjectedEffect::Sinusoid { amplitude: size, .. }
         | InjectedEffect::Telegraph { amplitude: size, .. }
         | InjectedEffect::Resonance { deviation: size, .. }
@@ -176,10 +127,29 @@ pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect 
         | InjectedEffect::Spikes { size, .. }
         | InjectedEffect::BiasStep { size, .. }
         | InjectedEffect::DroppedSamples { fraction: size }
-        | InjectedEffect::RepeatedSamples { fraction: size } => *size *= factor,
+        | InjectedEffect::RepeatedSamples { fraction: size } => Some(size),
+        InjectedEffect::Acceleration { .. }
+        | InjectedEffect::SampleClock { .. }
+        | InjectedEffect::FilterBandwidth { .. } => None,
+    }
+}
+
+pub(super) fn size(effect: &InjectedEffect) -> f64 {
+    match effect {
+        InjectedEffect::Acceleration { sensitivity, .. } => {
+            sensitivity.iter().map(|part| part * part).sum::<f64>().sqrt()
+        }
+        InjectedEffect::SampleClock { ratio } => (ratio - 1.0).abs(),
+        _ => size_mut(&mut effect.clone()).map_or(1.0, |size| size.abs()),
+    }
+}
+
+/// The effect with its size multiplied by `factor`; a filter's size is fixed.
+pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect {
+    match &mut effect {
         InjectedEffect::Acceleration { sensitivity, .. } => sensitivity.iter_mut().for_each(|part| *part *= factor),
         InjectedEffect::SampleClock { ratio } => *ratio = 1.0 + (*ratio - 1.0) * factor,
-        InjectedEffect::FilterBandwidth { .. } => {}
+        effect => size_mut(effect).into_iter().for_each(|size| *size *= factor),
     }
     effect
 }

@@ -7,7 +7,6 @@ use rand_distr::{Distribution, Exp1};
 use std::f64::consts::TAU;
 use virtual_sensor::Environment;
 
-/// Temperature, supply and force as deviations from constant values, per sample.
 pub(super) struct EnvironmentCourse {
     pub(super) temperature_c: Vec<f64>,
     pub(super) supply_v: Vec<f64>,

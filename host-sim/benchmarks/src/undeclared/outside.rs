@@ -2,6 +2,7 @@
 
 use super::environment::{EnvironmentCourse, frequency_factor, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;
+use clap::ValueEnum;
 use noise_analysis::report::Effect;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +18,7 @@ const KNOCK_DECAY_S: f64 = 0.1;
 const FEWEST_DROOPS: f64 = 6.0;
 
 /// Kinds of effects outside the vocabulary of the analysis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutsideKind {
     /// A sinusoid whose frequency is linear in time over the record.
@@ -52,49 +53,6 @@ pub enum OutsideKind {
 }
 
 impl OutsideKind {
-    /// All kinds, in the order of the tables.
-    pub const ALL: [Self; 15] = [
-        Self::Chirp,
-        Self::Decays,
-        Self::Sawtooth,
-        Self::ModulatedLine,
-        Self::LevelByTemperature,
-        Self::HeldValue,
-        Self::AlternatingConverters,
-        Self::ClockStep,
-        Self::SelfHeating,
-        Self::DeadTime,
-        Self::SupplyDroop,
-        Self::SwitchedLine,
-        Self::MissingCodes,
-        Self::WanderingBand,
-        Self::Knock,
-    ];
-
-    /// The name of the kind in the tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Chirp => "chirp",
-            Self::Decays => "decays",
-            Self::Sawtooth => "sawtooth",
-            Self::ModulatedLine => "modulated line",
-            Self::LevelByTemperature => "level by temp.",
-            Self::HeldValue => "held value",
-            Self::AlternatingConverters => "two converters",
-            Self::ClockStep => "clock step",
-            Self::SelfHeating => "self-heating",
-            Self::DeadTime => "dead time",
-            Self::SupplyDroop => "supply droop",
-            Self::SwitchedLine => "switched line",
-            Self::MissingCodes => "missing codes",
-            Self::WanderingBand => "wandering band",
-            Self::Knock => "knock",
-        }
-    }
-
-    /// Names that describe the effect.
-    #[must_use]
     pub const fn right_names(self) -> &'static [&'static str] {
         match self {
             Self::Chirp => &["chirp"],
@@ -114,7 +72,6 @@ impl OutsideKind {
     }
 }
 
-/// An effect outside the vocabulary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutsideEffect {
     pub(super) kind: OutsideKind,
@@ -127,7 +84,6 @@ pub struct OutsideEffect {
     pub(super) frequencies_hz: [f64; 2],
     /// Onset, s from the first sample, and time constant or length, s.
     pub(super) times_s: [f64; 2],
-    /// Seed of the effect's own random numbers.
     pub(super) seed: u64,
 }
 
@@ -388,7 +344,8 @@ mod tests {
     /// The highest frequency is 2.5 Hz.
     #[test]
     fn no_frequency_is_above_half_of_a_low_sample_rate() {
-        for (kind, seed) in OutsideKind::ALL.into_iter().flat_map(|kind| (0..20).map(move |seed| (kind, seed))) {
+        for (kind, seed) in OutsideKind::value_variants().iter().flat_map(|&kind| (0..20).map(move |seed| (kind, seed)))
+        {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let drawn = OutsideEffect::draw_unit(kind, OutputRegister::GyroX, (2400.0, 0.2), &mut random);
             assert!(drawn.frequencies_hz.iter().all(|frequency| *frequency <= 2.5), "{drawn:?}");

@@ -4,7 +4,6 @@ use measurement::Measurement;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Random stream of the losses.
 const STREAM: u64 = u64::MAX - 2;
 
 /// Removes samples with the probability `share` in every channel, as `gap`; the first and the last sample are kept.

@@ -27,16 +27,11 @@ const RECORDED: [Channel; 8] = [
 
 pub(super) const UNEXPLAINED: &str = "unexplained";
 
-/// The reason for which a recording could not be scored.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreError {
     #[error("seed {seed}: {reason}")]
-    Timeline {
-        /// Seed of the recording.
-        seed: u64,
-        reason: TimeBaseError,
-    },
+    Timeline { seed: u64, reason: TimeBaseError },
 }
 
 /// The error of a parameter of a named effect, in the report's unit.
@@ -52,7 +47,6 @@ pub struct ParameterScore {
     pub relative_error: f64,
 }
 
-/// A hidden effect and whether it was named.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectScore {
     pub kind: EffectKind,
@@ -76,7 +70,6 @@ pub struct UnseenErrors {
     pub refitted: f64,
 }
 
-/// The score of one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingScore {
     pub seed: u64,
@@ -86,11 +79,9 @@ pub struct RecordingScore {
     pub estimates: Vec<ParameterScore>,
     /// Absent if no effect is hidden, or if an error is not finite.
     pub unseen: Option<UnseenErrors>,
-    /// Score of the effect outside the vocabulary.
     pub outside: Option<OutsideScore>,
 }
 
-/// The score of a hidden effect outside the vocabulary.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutsideScore {
     pub kind: OutsideKind,

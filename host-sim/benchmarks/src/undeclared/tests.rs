@@ -16,6 +16,7 @@ use super::{DrawnRecording, EffectKind, OutsideKind, RecordingGroup, TrueRecordi
 use adis16405_driver::Channel;
 use allan_core::NoiseTerm as Term;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance};
+use clap::ValueEnum;
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{
     ClockDeviation, CurveEvidence, DroppedSamples, Effect, LineEvidence, LineSource, MarkovEvidence, MarkovProcess,
@@ -406,7 +407,7 @@ fn an_effect_outside_the_vocabulary_is_reported_by_its_own_name_or_as_unexplaine
 /// The smallest strength is 2. The change is in counts, in time stamps or in both.
 #[test]
 fn every_effect_outside_the_vocabulary_changes_the_recording() {
-    for kind in OutsideKind::ALL {
+    for &kind in OutsideKind::value_variants() {
         let case = DrawnRecording::from_group(RecordingGroup::Outside(kind), 100.0, 3);
         assert!(case.strengths[0] >= 2.0, "{kind:?}: {}", case.strengths[0]);
         let without = TrueRecording { outside: Vec::new(), ..case.simulation.clone() };

@@ -40,7 +40,6 @@ pub(super) struct TrueModelErrors {
     pub(super) fitted: f64,
 }
 
-/// The errors of the true model; `None` for short recordings.
 pub(super) fn true_model_errors(drawn: &DrawnRecording, channel: Channel) -> Option<TrueModelErrors> {
     let effects: Vec<InjectedEffect> =
         drawn.simulation.scenario.effects.iter().filter(|effect| !is_removable(effect)).cloned().collect();

@@ -17,18 +17,17 @@ pub struct LinearDrift {
     pub evidence: LinearDriftEvidence,
 }
 
-/// Evidence of a steady drift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LinearDriftEvidence {
-    /// The curve.
     Curve(CurveEvidence),
     /// A regression on time: the probability of such a slope by chance in white, flicker and walking noise of any mixture.
-    Regression { p_value: f64 },
+    Regression {
+        p_value: f64,
+    },
 }
 
 impl LinearDrift {
-    /// The slope with its unit.
     #[must_use]
     pub fn slope_parameter(&self) -> Parameter {
         self.slope.estimate().parameter(coefficient_unit(&NoiseTerm::RateRamp, self.slope.unit))

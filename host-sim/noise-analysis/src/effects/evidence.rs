@@ -17,23 +17,19 @@ pub struct CurveEvidence {
     pub gain_sigmas: f64,
 }
 
-/// Evidence of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LineEvidence {
     pub has_width: bool,
     pub source: LineSource,
 }
 
-/// The source in which a line was seen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LineSource {
-    /// In the curve alone.
     Curve(CurveEvidence),
     Spectrum(SpectrumEvidence),
 }
 
-/// A line of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpectrumEvidence {
     pub frequency_hz: f64,

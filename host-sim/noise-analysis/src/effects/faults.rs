@@ -10,7 +10,6 @@ pub struct DroppedSamples {
     /// Part of all samples.
     #[serde(skip)]
     pub fraction: BoundedEstimate,
-    /// Their number.
     pub missing: f64,
     /// Number of all samples, those that were used and those that were dropped.
     pub samples: f64,
@@ -33,7 +32,6 @@ pub struct RepeatedSamples {
     /// Part of all samples.
     #[serde(skip)]
     pub fraction: BoundedEstimate,
-    /// Number of those that equal the one before.
     pub equal: u64,
     pub samples: f64,
     /// Most samples that chance makes equal.
@@ -64,7 +62,6 @@ pub struct ClockDeviation {
     pub change: Option<RateChange>,
 }
 
-/// A change of the sample rate at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RateChange {
     #[serde(skip)]
@@ -104,9 +101,7 @@ pub struct Saturation {
     /// The limit with the most samples; it is exact.
     #[serde(skip)]
     pub level: ChannelEstimate,
-    /// True if that is an end of the range.
     pub is_end_of_range: bool,
-    /// Number of samples at a limit.
     pub cut_off: f64,
     pub samples: f64,
     /// Most samples that have another value in common.
@@ -132,7 +127,6 @@ pub struct StuckOutput {
     #[serde(skip)]
     pub to_s: BoundedEstimate,
     pub runs: u64,
-    /// Number of their samples.
     pub stuck: u64,
     pub samples: u64,
 }

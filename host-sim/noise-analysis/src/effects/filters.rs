@@ -53,7 +53,6 @@ pub struct LowPassFilter {
     pub evidence: CurveEvidence,
 }
 
-/// The design of a low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LowPassDesign {

@@ -13,7 +13,6 @@ pub const REFUTED: f64 = 2e-4;
 /// Likelihood ratio of two classes from which one of them is named: 95 % if they are as frequent.
 pub const TOLD_APART: f64 = 19.0;
 
-/// An effect by which a channel shows a cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelEffect {
     pub effect: Effect,

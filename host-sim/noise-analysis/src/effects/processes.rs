@@ -16,15 +16,16 @@ pub struct MarkovProcess {
     pub evidence: MarkovEvidence,
 }
 
-/// Evidence of a Markov process.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkovEvidence {
-    /// The curve.
     Curve(CurveEvidence),
     /// The spectrum, which is flat below a corner where a random walk would rise.
     /// The gain is in ln likelihood.
-    Spectrum { corner_hz: f64, gain: f64 },
+    Spectrum {
+        corner_hz: f64,
+        gain: f64,
+    },
 }
 
 impl MarkovProcess {
@@ -129,7 +130,6 @@ pub struct CommonMode {
     pub deviation: ChannelEstimate,
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
-    /// Names of the other channels that have it.
     pub others: Vec<&'static str>,
     /// Gain in ln likelihood over channels with nothing in common.
     pub gain: f64,

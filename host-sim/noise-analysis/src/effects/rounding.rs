@@ -18,7 +18,6 @@ pub struct AngleQuantization {
 }
 
 impl AngleQuantization {
-    /// Q with its unit.
     #[must_use]
     pub fn coefficient_parameter(&self) -> Parameter {
         self.coefficient.estimate().parameter(coefficient_unit(&NoiseTerm::Quantization, self.coefficient.unit))

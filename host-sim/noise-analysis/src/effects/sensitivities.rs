@@ -188,7 +188,6 @@ impl AccelerationSensitivity {
     /// Axes in the order of the sensitivities.
     pub const AXES: [&str; 3] = ["x", "y", "z"];
 
-    /// The sensitivities that are known, each with its axis.
     pub fn axes(&self) -> impl Iterator<Item = (&'static str, ChannelEstimate)> {
         Self::AXES.into_iter().zip(self.sensitivity).filter_map(|(axis, of)| Some((axis, of?)))
     }
@@ -202,7 +201,6 @@ pub struct VibrationRectification {
     pub sensitivity: ChannelEstimate,
     /// Unit of the accelerometer.
     pub per: &'static str,
-    /// Name of the accelerometer.
     pub accelerometer: &'static str,
     /// Root mean square of the strongest vibration, in the unit `per`.
     pub strongest: f64,
@@ -233,7 +231,6 @@ pub struct SharedDrift {
     pub ratio: ChannelEstimate,
     /// Unit of the other channel.
     pub per: &'static str,
-    /// Name of the other channel.
     pub with: &'static str,
     pub sigmas: f64,
     /// The largest plausible sensitivity over the data sheet's.

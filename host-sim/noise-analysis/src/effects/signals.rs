@@ -27,7 +27,6 @@ pub struct ModulatedLine {
     pub evidence: ModulationEvidence,
 }
 
-/// Evidence that a line changes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModulationEvidence {
@@ -124,7 +123,6 @@ pub struct Periodic {
     /// Frequency of its fundamental, Hz.
     #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
-    /// Amplitude of the fundamental.
     #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// Deviation of the second to the last harmonic over that of the fundamental, %.

@@ -8,7 +8,6 @@ use serde::Serialize;
 /// Something that no kind describes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Its place.
     #[serde(skip)]
     pub place: UnexplainedPlace,
     /// Excess of the deviation there over that of the model, %; `None` if it is not known to better than itself.
@@ -17,7 +16,6 @@ pub struct Unexplained {
     pub observation: Observation,
 }
 
-/// The place of an unexplained departure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum UnexplainedPlace {
     /// At an averaging time, s.
@@ -28,7 +26,6 @@ pub enum UnexplainedPlace {
     Frequency(BoundedEstimate),
 }
 
-/// The observation of an unexplained departure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Observation {
@@ -47,31 +44,40 @@ pub enum Observation {
     },
 }
 
-/// Evidence against a term that fits an octave of the curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refutation {
     /// A line of a few periods in the record, which its curve does not tell from a drift.
     FewPeriods,
-    /// The spectrum has no line there.
-    NotInSpectrum { frequency_hz: f64 },
+    NotInSpectrum {
+        frequency_hz: f64,
+    },
     /// The spectrum has another shape where the term is, with the probability by chance.
-    ShapeOfSpectrum { p_value: f64 },
-    /// The changes up and down differ.
-    Irreversible { time_constant_s: f64 },
+    ShapeOfSpectrum {
+        p_value: f64,
+    },
+    Irreversible {
+        time_constant_s: f64,
+    },
     /// The kurtosis is that of rare disturbances: its excess over that of two equally frequent levels, and the standard deviation.
-    RareDisturbances { time_constant_s: f64, kurtosis: [f64; 2] },
+    RareDisturbances {
+        time_constant_s: f64,
+        kurtosis: [f64; 2],
+    },
     /// The kurtosis, by the same figures, does not tell whether the process has two levels.
-    UndecidedLevels { time_constant_s: f64, kurtosis: [f64; 2] },
+    UndecidedLevels {
+        time_constant_s: f64,
+        kurtosis: [f64; 2],
+    },
 }
 
-/// Evidence against a resonance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BandMismatch {
     /// The form of its spectrum, with the probability by chance.
-    Shape { p_value: f64 },
-    /// The Allan deviation.
+    Shape {
+        p_value: f64,
+    },
     Curve,
 }
 

@@ -15,7 +15,6 @@ struct RegressionData {
     /// Without correlated rounding errors.
     channel: Curve<OCTAVES>,
     rounding: Rounding,
-    /// The covariates.
     channels: Vec<ChannelId>,
     covariates: Vec<Covariate<OCTAVES>>,
     with_channel: Vec<CovarianceCurve<OCTAVES>>,
@@ -106,12 +105,10 @@ impl CovariateFit {
         Self { data, sensitivities, smoothed_over_s, curve }
     }
 
-    /// The rounding errors of the channel's samples.
     pub(crate) fn rounding(&self) -> &Rounding {
         &self.data.rounding
     }
 
-    /// True if the channel depends on no covariate.
     pub(crate) fn is_empty(&self) -> bool {
         self.sensitivities.is_empty()
     }

@@ -34,7 +34,6 @@ pub(crate) struct EventShare {
 pub struct EventsReport {
     /// Events in the first half. Samples that are left out are one event where no more than six lie between them.
     pub count: u64,
-    /// Events an hour.
     pub rate_per_hour: Parameter,
     /// Standard deviation of the difference of their share in the variance from one half to the next, over the share, %: by how the
     /// energy of the events is spread over the first half.
@@ -64,7 +63,6 @@ impl EventShare {
         Self { points: difference(with, without), count, hours, relative_variance }
     }
 
-    /// True if there are no events.
     pub(crate) fn is_empty(&self) -> bool {
         self.count == 0
     }

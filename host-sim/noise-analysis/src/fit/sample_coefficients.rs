@@ -19,7 +19,6 @@ const LONGEST_SEGMENT: usize = 2048;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CoefficientsFrom {
-    /// All samples.
     Samples,
     /// The curve: too many samples are missing or only curves are kept, the channel is not traced, or the model has a ramp.
     #[default]

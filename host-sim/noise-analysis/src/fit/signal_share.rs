@@ -20,7 +20,6 @@ pub(crate) struct SignalShare {
     run: Option<Run>,
 }
 
-/// The share of a periodic signal.
 #[derive(Debug, Clone, PartialEq)]
 struct Harmonics {
     /// Frequency of the fundamental, Hz.
@@ -31,7 +30,6 @@ struct Harmonics {
     bounds: [f64; 2],
 }
 
-/// The share of a line whose frequency runs.
 #[derive(Debug, Clone, PartialEq)]
 struct Run {
     amplitude: f64,
@@ -57,7 +55,6 @@ impl SignalShare {
         Self { periodic: periodic.map(harmonics), run: track.map(run) }
     }
 
-    /// True if there are no signals.
     pub(crate) fn is_empty(&self) -> bool {
         self.periodic.is_none() && self.run.is_none()
     }
@@ -99,7 +96,6 @@ impl SignalShare {
         })
     }
 
-    /// Their share in the Allan variance at an averaging factor.
     pub(crate) fn avar(&self, n: u64, period_s: f64) -> f64 {
         let of_periodic = |Harmonics { frequency, amplitudes, .. }: &Harmonics| {
             avar_of_harmonics(*frequency, amplitudes.iter().copied(), n, period_s)

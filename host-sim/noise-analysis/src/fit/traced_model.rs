@@ -299,7 +299,6 @@ pub(crate) fn within_measured(model: &Model, curve: &Curve<OCTAVES>) -> Model {
     Model::new(model.sample_period(), model.terms().iter().map(bounded))
 }
 
-/// The residual of a model at a point of a curve.
 pub(crate) fn residual(model: &Model, point: &AllanPoint) -> Residual {
     let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
     Residual { n: point.n, excess, sigmas: excess * (2.0 * model.edf(point)).sqrt() }

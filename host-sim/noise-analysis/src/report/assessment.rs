@@ -30,7 +30,6 @@ const LEAST_GAIN: f64 = 1e-6;
 pub struct Assessment {
     /// The coefficients of the model that was fitted to the whole record, in the usual units.
     pub coefficients: Vec<Coefficient>,
-    /// Why there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients_note: Option<String>,
     /// The data that the model was fitted to.
@@ -43,7 +42,6 @@ pub struct Assessment {
     pub record: Vec<RecordLength>,
 }
 
-/// A coefficient in one unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coefficient {
     /// Such as `angle_random_walk`.
@@ -71,7 +69,6 @@ pub struct NavigationDrift {
     pub unit: String,
 }
 
-/// The record length that a coefficient needs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordLength {
     /// Such as `rate_random_walk`.

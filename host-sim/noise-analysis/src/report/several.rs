@@ -34,12 +34,10 @@ pub const DIFFERENCE_SIGNIFICANCE: f64 = 0.01;
 /// much as the rate.
 const RATE_TOLERANCE: f64 = 0.002;
 
-/// Why recordings cannot be compared.
 #[derive(Debug, Clone, PartialEq)]
 pub enum IncomparableRecordings {
     /// The sample rates, Hz, differ by more than 0.2 %.
     Rates(f64, f64),
-    /// No channel is in all recordings.
     NoChannel,
 }
 
@@ -56,18 +54,15 @@ impl std::fmt::Display for IncomparableRecordings {
     }
 }
 
-/// The test for the same noise in several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseAgreement {
     pub schema: u32,
     /// Rate of the first recording, Hz.
     pub sample_rate_hz: f64,
-    /// Samples of each recording.
     pub samples: Vec<u64>,
     pub channels: Vec<ChannelAgreement>,
 }
 
-/// One channel of several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelAgreement {
     pub name: String,
@@ -81,7 +76,6 @@ pub struct ChannelAgreement {
     pub joint: Vec<TermReport>,
 }
 
-/// One averaging time of several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OctaveAgreement {
     pub tau_s: f64,
@@ -91,7 +85,6 @@ pub struct OctaveAgreement {
     pub p_value: f64,
 }
 
-/// The increase of the noise while a machine runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseInflation {
     pub schema: u32,
@@ -100,7 +93,6 @@ pub struct NoiseInflation {
     pub channels: Vec<ChannelInflation>,
 }
 
-/// The inflation of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelInflation {
     pub name: String,
@@ -108,7 +100,6 @@ pub struct ChannelInflation {
     pub octaves: Vec<OctaveInflation>,
 }
 
-/// The inflation at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OctaveInflation {
     pub tau_s: f64,

@@ -202,7 +202,7 @@ impl ColumnSelection {
         if !self.assignments.is_empty() {
             let others = available.iter().enumerate().filter(|(at, _)| !is_used(at));
             let others: Vec<&str> = others.map(|(_, column)| column.name.as_str()).collect();
-            let note = || format!("{} left out: --columns does not name it", listed(&others));
+            let note = || note_on(&others, "left out: --columns does not name it");
             return (!others.is_empty()).then(note).into_iter().collect();
         }
         let named = by_name(available, sensor).unwrap_or_default();
@@ -219,17 +219,14 @@ impl ColumnSelection {
         let mut notes = Vec::new();
         if !unitless.is_empty() {
             let names: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
-            notes.push(format!("{} left out: no unit; --units gives one", listed(&names)));
+            notes.push(note_on(&names, "left out: no unit; --units gives one"));
         }
         if !other_unit.is_empty() {
             let names: Vec<&str> = other_unit.iter().map(String::as_str).collect();
-            notes.push(format!(
-                "{} left out: a unit of another quantity than the name; --columns reads it",
-                listed(&names)
-            ));
+            notes.push(note_on(&names, "left out: a unit of another quantity than the name; --columns reads it"));
         }
         if !no_channel.is_empty() {
-            notes.push(format!("{} left out: no known name of a channel; --columns reads it", listed(&no_channel)));
+            notes.push(note_on(&no_channel, "left out: no known name of a channel; --columns reads it"));
         }
         let has_no_name = |column: &&ChosenColumn| {
             let position = available.iter().position(|of| of.name == column.label);
@@ -237,14 +234,14 @@ impl ColumnSelection {
         };
         let by_unit: Vec<&str> = chosen.iter().filter(has_no_name).map(|column| column.label.as_str()).collect();
         if !by_unit.is_empty() {
-            notes.push(format!("{} are axes of a sensor by their unit; --columns says otherwise", listed(&by_unit)));
+            notes.push(note_on(&by_unit, "are axes of a sensor by their unit; --columns says otherwise"));
         }
         let by_interface = chosen.iter().filter(|column| self.unit_of_interface(column).is_some());
         let by_interface: Vec<&str> = by_interface.map(|column| column.label.as_str()).collect();
         if !by_interface.is_empty() {
-            let of =
-                "in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise";
-            notes.push(format!("{} taken to be {of}", listed(&by_interface)));
+            let of = "taken to be in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; \
+                      --units says otherwise";
+            notes.push(note_on(&by_interface, of));
         }
         notes
     }
@@ -419,6 +416,17 @@ fn names(available: &[AvailableColumn]) -> String {
     let shown: Vec<&str> = available.iter().take(SHOWN).map(|column| column.name.as_str()).collect();
     let more = if available.len() > SHOWN { ", …" } else { "" };
     format!("{}{more}", shown.join(", "))
+}
+
+/// Most names at the beginning of a note; more stand at its end.
+const FEW: usize = 8;
+
+/// `a, b left out: no unit`, or of many columns `60 columns left out: no unit. They are a, b, …`, which a screen may cut.
+fn note_on(names: &[&str], text: &str) -> String {
+    match names.len() {
+        0..=FEW => format!("{} {text}", listed(names)),
+        many => format!("{many} columns {text}. They are {}", listed(names)),
+    }
 }
 
 /// `a[0…8]` are nine elements of an array.

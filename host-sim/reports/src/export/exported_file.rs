@@ -10,17 +10,13 @@ pub enum AxisChoice {
     Worst,
 }
 
-/// Why a report cannot be written in a format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
     #[error("no gyroscope and no accelerometer in the report")]
     NoInertialChannel,
     #[error("{channel} is not in the report, and the format has a number for each axis")]
-    NoAxis {
-        /// Such as `gyro_y`.
-        channel: String,
-    },
+    NoAxis { channel: String },
     #[error(
         "no channel of the {0}s shows bias instability, random walk or a Markov process, from which the Gauss-Markov process \
          of the format is made: the record is too short"
@@ -28,13 +24,7 @@ pub enum ExportError {
     NoSlowNoise(&'static str),
     /// Negative, or beyond 10³⁰.
     #[error("{channel}: {term}, {parameter}: {value} is no coefficient of noise: the report is damaged")]
-    NoCoefficient {
-        channel: String,
-        term: String,
-        parameter: String,
-        /// The value in the report.
-        value: String,
-    },
+    NoCoefficient { channel: String, term: String, parameter: String, value: String },
     #[error(
         "parts at {0} Hz: the format has noise of samples at one rate; kalibr, openvins, orbslam3 and csv have densities"
     )]
@@ -46,7 +36,6 @@ pub enum ExportError {
 /// The text of a file, and what it lacks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Export {
-    /// The whole file.
     pub text: String,
     /// Fields of the format that the report lacks; comments in the file.
     pub missing: Vec<String>,

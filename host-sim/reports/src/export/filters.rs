@@ -121,7 +121,6 @@ fn six_axes<'a>(gyroscope: &[AxisNoise<'a>; 3], accelerometer: &[AxisNoise<'a>; 
     gyroscope.iter().chain(accelerometer).cloned().collect()
 }
 
-/// A remark on the axes whose number is an upper bound.
 fn bounds(axes: &[AxisNoise<'_>; 3], values: &[Coefficient; 3]) -> String {
     let bounded = axes.iter().zip(values).filter(|(_, of)| of.is_bound);
     let names: Vec<&str> = bounded.map(|(axis, _)| axis.channel.name.as_str()).collect();

@@ -24,7 +24,6 @@ pub(super) struct Coefficient {
     /// In SI units; the upper 95 % bound if only that is known.
     pub value: f64,
     pub is_bound: bool,
-    /// The estimate in SI units.
     pub estimate: f64,
 }
 
@@ -32,7 +31,6 @@ pub(super) struct Coefficient {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct AxisNoise<'a> {
     pub channel: &'a SavedChannel,
-    /// Factor from the channel's unit to the SI unit.
     pub to_si: f64,
     /// N, rad/s/√Hz or m/s²/√Hz.
     pub white: Option<Coefficient>,

@@ -69,8 +69,6 @@ pub(super) fn openvins(report: &SavedReport, axes: AxisChoice) -> Result<Export,
     Ok(export)
 }
 
-/// The lines on the IMU in a configuration of VINS-Mono or VINS-Fusion.
-///
 /// The covariance takes both times dt² a step (`V·noise·Vᵀ`), so both are deviations of samples: N·√f and K·√f.
 pub(super) fn vins(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let rate = report.sample_rate_hz;

@@ -18,7 +18,6 @@ const RESIDUAL: std::ops::RangeInclusive<f64> = 4.0..=30.0;
 /// Points of a term's line per octave.
 const PER_OCTAVE: u32 = 2;
 
-/// Allan deviation with bounds, models and terms, and the residuals beneath.
 pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> Plot {
     let data = measured(channel, Look::Measured, "measured, 95 % bounds");
     let has_terms = channel.refitted.adev != channel.before.adev;
@@ -110,7 +109,6 @@ fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
 
 const SLOPES: [&str; 3] = ["−½", "0", "+½"];
 
-/// The slopes that are not drawn.
 fn describe_slopes(channel: &ChannelReport) -> String {
     let lines = slopes(channel);
     let absent: Vec<&str> =
@@ -150,7 +148,6 @@ fn deviations(channel: &ChannelReport, adev: &[f64]) -> Vec<(f64, f64)> {
     pairs.filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect()
 }
 
-/// The terms of the model to use; N, B and K with numbers.
 fn terms(report: &Report, channel: &ChannelReport) -> Vec<Line> {
     let (model, rate_hz) = (&channel.refitted, report.sample_rate_hz);
     let [n, b, k] = &summary::coefficients_in_short(report, &channel.name);
@@ -219,7 +216,6 @@ fn traced_lines(report: &Report, channel: &ChannelReport) -> Vec<Place> {
     lines.filter_map(|finding| Some(Place::at_frequency(finding.effect.frequency_hz()?.value))).collect()
 }
 
-/// The spectrum with bounds, traced lines and the filtered model; `None` without one.
 pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<Plot> {
     let spectrum = channel.figure_data.spectrum.as_ref()?;
     let along = |values: &[f64]| -> Vec<(f64, f64)> {
@@ -243,7 +239,6 @@ pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<
     Some(of_channel(channel, "spectrum", "spectrum", description, [panel]))
 }
 
-/// The bias over time with its covariates, and the rest beneath; `None` without one.
 pub(crate) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
     let bias = channel.figure_data.bias_over_time.as_ref()?;
     let (scale, per) = time_unit(bias.time_s.last().copied().unwrap_or(0.0));

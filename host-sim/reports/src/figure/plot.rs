@@ -4,9 +4,8 @@ use super::axis::{Axis, Tick};
 use crate::rounding::{quantity_digits, significant};
 use maud::{Markup, html};
 
-/// Width of every figure, pixels.
+/// Width of every figure, and edges of its panels, pixels.
 pub(super) const WIDTH: f64 = 760.0;
-/// Left edge of the panels, pixels.
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const RIGHT: f64 = 744.0;
 /// Top of the first panel: below the legend.
@@ -50,30 +49,26 @@ pub(super) const COLOURS: [(&str, &str, &str); 8] = [
     ("followed", "#a8286b", "#ff8fc4"),
 ];
 
-/// Title of an axis of averaging times.
 pub(super) const TAU: &str = "averaging time τ, s";
 /// Looks of the channels of one unit.
 pub(super) const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
 
-/// Title of an axis of Allan deviations in this unit.
 pub(super) fn deviation_label(unit: &str) -> String {
     format!("Allan deviation σ(τ), {}", crate::rounding::unit(unit))
 }
 
-/// Values of one quantity along a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Line {
     pub name: String,
     pub look: Look,
     pub points: Vec<(f64, f64)>,
-    /// Bounds of each value; empty without.
+    /// Empty without.
     pub bounds: Vec<(f64, f64)>,
     pub has_dots: bool,
     pub is_joined: bool,
     pub in_legend: bool,
-    /// Text beside an end of the line; empty without.
+    /// Empty without.
     pub mark: String,
-    /// The mark is at the right end.
     pub mark_is_right: bool,
 }
 
@@ -152,7 +147,6 @@ impl Plot {
     }
 }
 
-/// Top and bottom of each panel.
 pub(super) fn frames<const PANELS: usize>(heights: [f64; PANELS]) -> [[f64; 2]; PANELS] {
     let mut top = TOP;
     heights.map(|height| {
@@ -265,7 +259,6 @@ impl Plot {
         }
     }
 
-    /// Axes and lines of every panel, for the page's script.
     pub(crate) fn values(&self) -> String {
         let panels: Vec<String> = self.panels.iter().map(Panel::values).collect();
         format!("[{}]", panels.join(","))
@@ -277,13 +270,11 @@ impl Panel {
         Self { across, up, lines, places: Vec::new() }
     }
 
-    /// A panel with logarithmic axes around all `lines`.
     pub(super) fn logarithmic(across: &str, up: &str, lines: Vec<Line>, frame: [f64; 2]) -> Self {
         let across = Axis::logarithmic(across, lines.iter().flat_map(places), [LEFT, RIGHT]);
         Self::new(across, Axis::logarithmic(up, lines.iter().flat_map(heights), frame), lines)
     }
 
-    /// A panel with linear axes around all `lines`.
     pub(super) fn linear(across: &str, up: &str, lines: Vec<Line>, frame: [f64; 2]) -> Self {
         let across = Axis::linear(across, lines.iter().flat_map(places), [LEFT, RIGHT]);
         Self::new(across, Axis::linear(up, lines.iter().flat_map(heights), frame), lines)

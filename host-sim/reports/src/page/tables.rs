@@ -15,7 +15,6 @@ fn cells(headings: &[Heading]) -> Markup {
     }
 }
 
-/// `rows` are `tr` elements.
 fn table(headings: &[Heading], rows: &Markup) -> Markup {
     html! {
         div.scroll {
@@ -40,7 +39,6 @@ pub(super) fn laid_out(ReportTable { headings, rows, text_columns }: &ReportTabl
     table(&headings.collect::<Vec<Heading>>(), &rows)
 }
 
-/// N, B and K in users' units, with data sheet and errors.
 pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     coefficients(&summary::coefficient_tables(report), true)
 }

@@ -15,7 +15,6 @@ const CORNERS: usize = 24;
 const CORNER_RATIO: f64 = 1.15;
 const LEAST_GAIN: f64 = 10.0;
 
-/// The noise of the gyros and accelerometers of a recording.
 pub(super) struct NoiseEstimate {
     pub(super) model: NoiseModel,
     /// Corner of each channel's white noise, Hz; infinite without a filter.
@@ -39,7 +38,6 @@ pub(super) fn noise_estimate(samples: &Measurement) -> NoiseEstimate {
     NoiseEstimate { model, corners_hz, channels }
 }
 
-/// The values of a channel in its unit.
 fn values(channel: &MeasuredChannel) -> Vec<f64> {
     channel.counts.iter().map(|&count| f64::from(count) * channel.profile.lsb).collect()
 }
@@ -119,8 +117,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
 #[cfg(test)]
 mod tests {
     use super::coefficients;
-    use crate::spectral_noise::gaussian_noise;
-    use crate::undeclared::generator::baseline;
+    use crate::spectral_noise::{baseline, gaussian_noise};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use std::f64::consts::TAU;

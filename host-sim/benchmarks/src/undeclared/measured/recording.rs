@@ -12,14 +12,12 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-/// A recording of a sensor at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseRecording {
     pub name: String,
     pub samples: Measurement,
 }
 
-/// The reason for which a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeasuredNoiseError {
@@ -28,11 +26,7 @@ pub enum MeasuredNoiseError {
     #[error("{0}: the sensor is never at rest")]
     Moving(String),
     #[error("{file}: {reason}")]
-    TimeBase {
-        /// The file, as given by the user.
-        file: String,
-        reason: TimeBaseError,
-    },
+    TimeBase { file: String, reason: TimeBaseError },
 }
 
 impl NoiseRecording {

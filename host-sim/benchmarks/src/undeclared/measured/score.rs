@@ -15,16 +15,10 @@ use std::collections::BTreeSet;
 pub struct MeasuredErrors {
     pub before: Option<f64>,
     pub after: Option<f64>,
-    /// Deviances without the samples that the rules of the first half exclude.
-    pub excluding: [Option<f64>; 2],
-    /// Deviance of the first half's curve, used as a model.
-    pub first_half_curve: Option<f64>,
-    pub untouched_before: Option<f64>,
     /// Deviance with added terms in the untouched stretch.
     pub untouched_after: Option<f64>,
 }
 
-/// The score of an effect in a stretch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasuredScore {
     pub recording: String,
@@ -151,13 +145,5 @@ fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErro
         return MeasuredErrors::default();
     };
     let raw = |model: &ModelReport| model.unseen.deviance_per_point;
-    let excluding = |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
-    MeasuredErrors {
-        before: raw(&report.before),
-        after: raw(&report.after),
-        excluding: [excluding(&report.before), excluding(&report.after)],
-        first_half_curve: report.first_half_curve.deviance_per_point,
-        untouched_before: raw(&untouched.before),
-        untouched_after: raw(&untouched.after),
-    }
+    MeasuredErrors { before: raw(&report.before), after: raw(&report.after), untouched_after: raw(&untouched.after) }
 }

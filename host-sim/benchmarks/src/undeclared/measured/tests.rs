@@ -75,17 +75,18 @@ fn a_part_has_its_own_periods_and_gaps() {
 
 #[test]
 fn every_kind_is_hidden_in_every_stretch_or_counted() {
-    let recordings = vec![recorded(60.0, 3)];
     let plan = MeasuredNoisePlan {
-        recordings,
+        recordings: Vec::new(),
+        rate: None,
         stretches: 1,
-        length: StretchLength::Seconds(40.0),
+        seconds: 40.0,
+        samples: None,
         strength: 3.0,
         seed: 11,
         jobs: 2,
     };
-    let table = plan.run(|_, _| ());
-    assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::ALL.len());
+    let table = plan.score(&[recorded(60.0, 3)], |_, _| ());
+    assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::all().len());
     assert!(table.not_hidden.len() <= 3, "{:?}", table.not_hidden);
     assert!(table.scores.iter().all(|score| score.strength >= 0.95 * 3.0));
     let known = || table.scores.iter().filter(|score| matches!(score.kind, HiddenKind::Known(_)));

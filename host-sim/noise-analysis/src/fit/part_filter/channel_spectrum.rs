@@ -9,7 +9,6 @@ use allan_core::{Curve, Model, NoiseTerm};
 
 /// An inertial channel and what it says of the filter.
 pub(crate) struct FilteredChannel<'a> {
-    /// As in reports.
     pub name: &'static str,
     /// Without the share of its covariates.
     pub curve: &'a Curve<OCTAVES>,
@@ -57,7 +56,6 @@ impl ChannelSpectrum {
         })
     }
 
-    /// Number of the bands of the spectrum.
     pub(super) fn bands(&self) -> f64 {
         self.spectrum.bands() as f64
     }

@@ -32,7 +32,6 @@ impl Family {
         filters.iter().flat_map(|&filter| [Self::EveryValue(filter), Self::ReadSlowly(filter)]).collect()
     }
 
-    /// The low-pass designs that are in use.
     pub(super) fn low_passes() -> [Self; 2] {
         [LowPass::butterworth, LowPass::two_stages].map(Self::LowPass)
     }
@@ -47,7 +46,6 @@ impl Family {
         }
     }
 
-    /// Taps of moving averages.
     pub(super) fn taps(self) -> Option<u16> {
         match self {
             Self::EveryValue(filter) | Self::ReadSlowly(filter) => Some(filter.taps),
