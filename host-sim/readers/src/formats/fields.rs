@@ -1,8 +1,8 @@
 //! Fields of a text row and their numbers.
 
-use crate::columns::unit::Unit;
+use crate::columns::Unit;
 use crate::input::delimited_text;
-use crate::rows::batch::Number;
+use crate::rows::Number;
 
 /// The first that occurs; else blanks.
 const SEPARATORS: [char; 4] = [';', '\t', ',', '|'];

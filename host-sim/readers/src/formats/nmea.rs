@@ -1,6 +1,6 @@
 //! Sentences of NMEA 0183, `$NAME,field,…*68`, with the exclusive or between `$` and `*`.
 
-use crate::columns::column_selection::AvailableColumn;
+use crate::columns::AvailableColumn;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sentence<'a> {

@@ -1,7 +1,6 @@
 //! The head of a text table: start of the rows, preamble, columns.
 
-use crate::columns::column_selection::{AvailableColumn, is_output_register};
-use crate::columns::unit::Unit;
+use crate::columns::{AvailableColumn, Unit, is_output_register};
 use crate::formats::calendar::{self, CalendarColumns};
 use crate::formats::fields::{list_lengths, number, separator_of, split, with_unit};
 use crate::formats::row_kinds::RowKind;
