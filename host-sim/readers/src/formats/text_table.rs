@@ -282,7 +282,11 @@ impl Opened<'_> {
                 named.ok_or_else(|| file.error(unknown(topic)))?
             }
             None => {
-                let most = kinds.iter().filter(|(name, ..)| is_numeric(name)).max_by_key(|(.., count)| *count);
+                let is_of_sensor = |(name, width, _): &(String, usize, usize)| {
+                    nmea::columns(name, *width).iter().any(|column| column.prefix_and_channel().is_some())
+                };
+                let numeric = kinds.iter().filter(|(name, ..)| is_numeric(name));
+                let most = numeric.max_by_key(|kind| (is_of_sensor(kind), kind.2));
                 most.ok_or_else(|| file.error(Reason::NoNumbers))?
             }
         };
