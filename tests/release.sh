@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds all files of a release into one folder: ./tests/release.sh [FOLDER]
 #
-# These are the packages of both libraries (each with `cargo publish --dry-run`), the Python wheel, the image of every board as an ELF and
+# These are the packages of the libraries (with `cargo publish --dry-run`), the Python wheel, the image of every board as an ELF and
 # as the file for its boot loader, the program, the page for browsers as one file, and SHA256SUMS of all of them. Publishes nothing. The
 # default folder is target/release-VERSION. Needs the tools that tests/run.sh installs, and a tree without uncommitted changes, since a
 # package contains only committed files.
@@ -16,13 +16,12 @@ rm -rf "$out"
 mkdir -p "$out"
 run() { printf '+ %s\n' "$*"; "$@"; }
 
-# The libraries; neither needs the other.
-for package in adis16405-driver allan-core; do
-    run cargo publish --dry-run --locked --package "$package" --target-dir "$target/publish"
-    # A dry run does not print the path of its package.
-    run cargo package --quiet --locked --no-verify --package "$package" --target-dir "$target/publish"
-    cp "$target/publish/package/$package-$version.crate" "$out"
-done
+# The libraries; readers needs time-base.
+packages=(adis16405-driver allan-core time-base readers)
+run cargo publish --dry-run --locked "${packages[@]/#/--package=}" --target-dir "$target/publish"
+# A dry run does not print the path of its package.
+run cargo package --quiet --locked --no-verify "${packages[@]/#/--package=}" --target-dir "$target/publish"
+for package in "${packages[@]}"; do cp "$target/publish/package/$package-$version.crate" "$out"; done
 
 # The Python module and the command are in one wheel.
 python=$target/python/bin

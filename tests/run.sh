@@ -155,7 +155,8 @@ page() { # the tests open it
     run "$TARGET/debug/build-page" --quick "$BROWSER_PAGE" "$TARGET/browser-test.uf2"
 }
 documentation() {
-    RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --package adis16405-driver --package allan-core --all-features
+    RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --all-features \
+        --package adis16405-driver --package allan-core --package time-base --package readers
     run cargo test --quiet --doc "${FEATURES[@]}" 2>&1 | tee -a "$log"
 }
 dependencies() {

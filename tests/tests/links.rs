@@ -9,8 +9,17 @@ fn root() -> PathBuf {
 
 /// The pages: Markdown files of the root and of the folders with documentation.
 fn pages() -> Vec<PathBuf> {
-    let folders =
-        ["", "docs", "adis16405-driver", "allan-core", "allan-core/guide", "allan-core/ffi", "host-sim/python"];
+    let folders = [
+        "",
+        "docs",
+        "adis16405-driver",
+        "allan-core",
+        "allan-core/guide",
+        "allan-core/ffi",
+        "host-sim/python",
+        "host-sim/readers",
+        "host-sim/time-base",
+    ];
     let markdown = folders.iter().flat_map(|folder| std::fs::read_dir(root().join(folder)).expect("a folder"));
     let mut pages: Vec<PathBuf> = markdown.map(|entry| entry.expect("an entry").path()).collect();
     pages.retain(|path| path.extension().is_some_and(|ending| ending == "md"));

@@ -1,9 +1,16 @@
 //! Columns of a recording: names, choice, units.
 
-pub(crate) mod column_selection;
-pub(crate) mod printable;
-pub(crate) mod sensor;
-pub(crate) mod unit;
+mod column_selection;
+mod printable;
+mod sensor;
+mod unit;
+
+pub(crate) use column_selection::{AvailableColumn, ChosenColumn, Role, as_they_are, known_by_name};
+pub use column_selection::{ColumnSelection, RowOptions, SelectionError, is_output_register};
+pub use printable::Printable;
+pub(crate) use sensor::INERTIAL;
+pub use sensor::{SensorChannel, SensorChannels};
+pub(crate) use unit::{COUNT, SECOND, Unit};
 
 /// Those of a gyroscope.
 pub const GYROSCOPE: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];

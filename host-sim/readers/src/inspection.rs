@@ -5,14 +5,10 @@ mod sensor_guess;
 mod steady_part;
 mod unit_guess;
 
-use crate::columns::column_selection::ColumnSelection;
-use crate::columns::sensor::SensorChannels;
+use crate::columns::{ColumnSelection, SensorChannels};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
-use crate::rows::batch::Batch;
-use crate::rows::padding::PaddingFinder;
-use crate::rows::row_source::BATCH;
-use crate::rows::whole_table::WholeTable;
+use crate::rows::{BATCH, Batch, PaddingFinder, WholeTable};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use time_base::{Clock, Place, RowStamp};

@@ -16,22 +16,8 @@ pub(crate) fn field(channel: Channel) -> RegisterField {
     RegisterField { place: channel as usize, limits: channel.limits() }
 }
 
-/// A column of values with the profile of its channel, whose LSB is not that of the numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ProfiledColumn {
-    pub(crate) profile: ChannelProfile,
-    /// For 1, in the profile's unit.
-    pub(crate) factor: f64,
-    pub(crate) label: String,
-    pub(crate) register: Option<RegisterField>,
-}
-
-impl ProfiledColumn {
-    fn new(column: &ValueColumn, sensor: &SensorProfile) -> Option<Self> {
-        let ValueColumn { channel, factor, label, register } = column.clone();
-        Some(Self { profile: sensor.channel(channel.name)?, factor, label, register })
-    }
-}
+/// A column of values with the profile of its channel.
+pub(crate) type ProfiledColumn = ValueColumn<ChannelProfile>;
 
 pub(crate) fn channel(register: Option<RegisterField>) -> Option<Channel> {
     register.and_then(|register| Channel::ALL.get(register.place).copied())
@@ -46,8 +32,10 @@ pub(crate) enum BatchSource<'a> {
 impl<'a> BatchSource<'a> {
     /// Any sensor, or an ADIS16405's counts in `range`.
     pub(crate) fn file(rows: FileRows<'a>, sensor: &SensorProfile, range: Option<GyroRange>) -> Self {
-        let columns: Vec<ProfiledColumn> =
-            rows.columns().iter().filter_map(|column| ProfiledColumn::new(column, sensor)).collect();
+        let profiled = |ValueColumn { channel, factor, label, register }: ValueColumn| {
+            Some(ProfiledColumn { channel: sensor.channel(channel.name)?, factor, label, register })
+        };
+        let columns: Vec<ProfiledColumn> = rows.columns().iter().cloned().filter_map(profiled).collect();
         let channels: Option<Vec<Channel>> = columns.iter().map(|column| channel(column.register)).collect();
         let validator = range.zip(channels).map(|(range, channels)| Box::new(Recorder::new(channels, range)));
         Self::File(rows, columns, validator)
@@ -139,13 +127,8 @@ impl<'a> RecordedRows<'a> {
     pub(crate) fn new(recording: &'a Recording) -> Self {
         let profile = adis16405::profile(recording.range.lsb());
         let column = |&channel: &Channel| {
-            let profile = profile.channels[channel as usize];
-            ProfiledColumn {
-                profile,
-                factor: profile.lsb,
-                label: channel.name().to_owned(),
-                register: Some(field(channel)),
-            }
+            let (of, register) = (profile.channels[channel as usize], Some(field(channel)));
+            ProfiledColumn { channel: of, factor: of.lsb, label: channel.name().to_owned(), register }
         };
         Self {
             columns: recording.channels.iter().map(column).collect(),

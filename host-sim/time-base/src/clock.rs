@@ -166,12 +166,10 @@ impl Clock {
                 let mut first = std::mem::take(first);
                 let later = first.split_off(first.len().min(FIRST_ROWS));
                 let is_all = is_last && later.is_empty();
-                self.state = begin(&first, self.stated_hz, is_all).or_else(|error| match self.stated_hz {
-                    Some(_) if is_of_stamps(&error) => {
-                        self.ignored = Some(format!("the time stamps are ignored: {error}"));
-                        self.row_clock()
-                    }
-                    _ => Err(error),
+                self.state = begin(&first, self.stated_hz, is_all).or_else(|error| {
+                    self.ignored = Some(ignore_stamps(error, self.stated_hz)?);
+                    let none = RepeatRule { shortest_s: 0.0 };
+                    Ok(State::Stream(Box::new(Stream::new(none, false, None, None)?)))
                 })?;
                 let mut places = self.place(first, is_all)?;
                 if !is_all {
@@ -187,14 +185,11 @@ impl Clock {
                 }
                 let Coarse { times_s, repeated, .. } = coarse;
                 let rows = times_s.len();
-                let places =
-                    align(times_s, std::mem::take(repeated), self.stated_hz).or_else(|error| match self.stated_hz {
-                        Some(_) if is_of_stamps(&error) => {
-                            self.ignored = Some(format!("the time stamps are ignored: {error}"));
-                            Ok(KnownPlaces::of_rows(rows))
-                        }
-                        _ => Err(error),
-                    })?;
+                let places = align(times_s, std::mem::take(repeated), self.stated_hz).or_else(|error| {
+                    self.ignored = Some(ignore_stamps(error, self.stated_hz)?);
+                    let periods = (0..rows as u64).collect();
+                    Ok(KnownPlaces { periods, repeated: Vec::new(), stamps: StampQuality::default() })
+                })?;
                 let count = places.periods.len() + places.repeated.len();
                 let mut known = Known::new(Arc::new(places));
                 let placed = known.next(count);
@@ -203,10 +198,6 @@ impl Clock {
             }
             State::Known(known) => Ok(known.next(rows.len())),
         }
-    }
-
-    fn row_clock(&self) -> Result<State, TimeBaseError> {
-        Ok(State::Stream(Box::new(Stream::new(RepeatRule { shortest_s: 0.0 }, false, None, None)?)))
     }
 
     /// Reason to ignore the stamps.
@@ -252,17 +243,13 @@ impl Clock {
     }
 }
 
-impl KnownPlaces {
-    fn of_rows(rows: usize) -> Self {
-        Self { periods: (0..rows as u64).collect(), repeated: Vec::new(), stamps: StampQuality::default() }
-    }
-}
-
-fn is_of_stamps(error: &TimeBaseError) -> bool {
-    matches!(
+/// A note on stamps that a stated rate makes needless; another error stays.
+fn ignore_stamps(error: TimeBaseError, stated_hz: Option<f64>) -> Result<String, TimeBaseError> {
+    let is_of_stamps = matches!(
         error,
         TimeBaseError::RateContradictsStamps { .. } | TimeBaseError::NoPeriod | TimeBaseError::TooSparse { .. }
-    )
+    );
+    if is_of_stamps && stated_hz.is_some() { Ok(format!("the time stamps are ignored: {error}")) } else { Err(error) }
 }
 
 /// By the first rows; `is_all` if there are no others.

@@ -1,7 +1,4 @@
-//! Time base of a recording: sample rate, and sample period of each sample.
-//!
-//! [`StampOrder`] handles counters that wrap and clocks that are set; [`Clock`] places rows; [`StampQuality`] states
-//! doubts.
+#![doc = include_str!("../README.md")]
 
 mod clock;
 mod clock_rate;

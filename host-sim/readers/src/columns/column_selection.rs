@@ -1,9 +1,7 @@
 //! The columns of channels, time and index with their units, as the user says or by their names.
 
 use crate::columns;
-use crate::columns::printable::Printable;
-use crate::columns::sensor::{INERTIAL, SensorChannel, SensorChannels};
-use crate::columns::unit::{COUNT, SECOND, Unit};
+use crate::columns::{COUNT, INERTIAL, Printable, SECOND, SensorChannel, SensorChannels, Unit};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Role {
@@ -197,13 +195,17 @@ impl ColumnSelection {
         chosen: &[ChosenColumn],
         sensor: &SensorChannels,
     ) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut add = |names: &[&str], what: &str| {
+            notes.extend((!names.is_empty()).then(|| note_on(names, what)));
+        };
         // Positions may be those of a whole row.
         let is_used = |at: &usize| chosen.iter().any(|column| column.label == available[*at].name);
         if !self.assignments.is_empty() {
             let others = available.iter().enumerate().filter(|(at, _)| !is_used(at));
             let others: Vec<&str> = others.map(|(_, column)| column.name.as_str()).collect();
-            let note = || note_on(&others, "left out: --columns does not name it");
-            return (!others.is_empty()).then(note).into_iter().collect();
+            add(&others, "left out: --columns does not name it");
+            return notes;
         }
         let named = by_name(available, sensor).unwrap_or_default();
         let unitless = self.unitless_companions(&named, available);
@@ -216,33 +218,23 @@ impl ColumnSelection {
                 _ => no_channel.push(column.name.as_str()),
             }
         }
-        let mut notes = Vec::new();
-        if !unitless.is_empty() {
-            let names: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
-            notes.push(note_on(&names, "left out: no unit; --units gives one"));
-        }
-        if !other_unit.is_empty() {
-            let names: Vec<&str> = other_unit.iter().map(String::as_str).collect();
-            notes.push(note_on(&names, "left out: a unit of another quantity than the name; --columns reads it"));
-        }
-        if !no_channel.is_empty() {
-            notes.push(note_on(&no_channel, "left out: no known name of a channel; --columns reads it"));
-        }
         let has_no_name = |column: &&ChosenColumn| {
             let position = available.iter().position(|of| of.name == column.label);
             position.is_some_and(|position| role_by_name(available, position, sensor).is_none())
         };
-        let by_unit: Vec<&str> = chosen.iter().filter(has_no_name).map(|column| column.label.as_str()).collect();
-        if !by_unit.is_empty() {
-            notes.push(note_on(&by_unit, "are axes of a sensor by their unit; --columns says otherwise"));
-        }
-        let by_interface = chosen.iter().filter(|column| self.unit_of_interface(column).is_some());
-        let by_interface: Vec<&str> = by_interface.map(|column| column.label.as_str()).collect();
-        if !by_interface.is_empty() {
-            let of = "taken to be in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; \
-                      --units says otherwise";
-            notes.push(note_on(&by_interface, of));
-        }
+        let labels = |is_one: &dyn Fn(&&ChosenColumn) -> bool| -> Vec<&str> {
+            chosen.iter().filter(is_one).map(|column| column.label.as_str()).collect()
+        };
+        let unitless: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
+        let other_unit: Vec<&str> = other_unit.iter().map(String::as_str).collect();
+        add(&unitless, "left out: no unit; --units gives one");
+        add(&other_unit, "left out: a unit of another quantity than the name; --columns reads it");
+        add(&no_channel, "left out: no known name of a channel; --columns reads it");
+        add(&labels(&has_no_name), "are axes of a sensor by their unit; --columns says otherwise");
+        add(
+            &labels(&|column| self.unit_of_interface(column).is_some()),
+            "taken to be in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise",
+        );
         notes
     }
 
@@ -625,7 +617,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
 #[cfg(test)]
 mod tests {
     use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
-    use crate::columns::sensor::SensorChannels;
+    use crate::columns::SensorChannels;
 
     fn chosen(headings: &[&str], columns: &[&str], units: &[&str]) -> Result<Vec<(String, f64)>, SelectionError> {
         let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();

@@ -1,15 +1,11 @@
 //! DataFlash logs of ArduPilot (`.bin`): IMU messages, and batches of raw samples (ISBH, ISBD). The crate
 //! `ardupilot-binlog` 0.2 panics at a stated length below 3.
 
-use crate::columns::column_selection::AvailableColumn;
-use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Unit};
 use crate::formats::message_layout::Scalar;
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
-use crate::input::budget::{Budget, Metered};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
-use crate::rows::whole_table::TopicSensor;
+use crate::formats::topics::{EachRow, Offer, Source, Topic};
+use crate::input::{Budget, FileBytes, InputError, Metered, Reason};
+use crate::rows::{Ending, Number, TopicSensor};
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, ErrorKind, Read};
 
@@ -77,7 +73,7 @@ impl Rows {
         }
         let is_sensor = sensor.columns.len() > 1;
         if let Some(temperature) = at(TEMPERATURE).filter(|_| is_sensor) {
-            sensor.columns.push(("temp", temperature, crate::columns::unit::Unit::parse("degC")));
+            sensor.columns.push(("temp", temperature, Unit::parse("degC")));
         }
         let column = |(label, ..): &(String, char, usize)| match TIMES.iter().find(|(known, _)| known == label) {
             Some((_, unit)) => AvailableColumn::known(label, unit),

@@ -1,14 +1,10 @@
 //! Named arrays of NumPy, MATLAB and HDF5, and the tables that they form.
 
-use crate::columns::column_selection::{AvailableColumn, known_by_name};
-use crate::columns::unit::Unit;
-use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Unit, known_by_name};
 use crate::formats::message_layout::Scalar;
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Stop, Topic};
-use crate::input::budget::Budget;
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
-use crate::rows::whole_table::{MAX_SAMPLES, TopicSensor};
+use crate::formats::topics::{EachRow, Offer, Source, Stop, Topic};
+use crate::input::{Budget, InputError, Reason};
+use crate::rows::{Ending, MAX_SAMPLES, Number, TopicSensor};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 

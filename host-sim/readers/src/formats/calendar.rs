@@ -1,8 +1,8 @@
 //! Calendar times of loggers: dates, times of day, both in one text, or parts in several columns.
 
-use crate::columns::column_selection::AvailableColumn;
+use crate::columns::AvailableColumn;
 use crate::formats::fields::number;
-use crate::rows::batch::Number;
+use crate::rows::Number;
 use jiff::civil::Date;
 
 const SECOND_NS: i64 = 1_000_000_000;

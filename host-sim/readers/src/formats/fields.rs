@@ -1,8 +1,9 @@
 //! Fields of a text row and their numbers.
 
-use crate::columns::unit::Unit;
+use crate::columns::Unit;
 use crate::input::delimited_text;
-use crate::rows::batch::Number;
+use crate::rows::Number;
+use std::str::SplitAsciiWhitespace;
 
 /// The first that occurs; else blanks.
 const SEPARATORS: [char; 4] = [';', '\t', ',', '|'];
@@ -13,25 +14,77 @@ const MISSING: [&str; 22] = [
 ];
 
 /// Between time and line in the Arduino serial monitor.
-pub(crate) const ARROW: &str = " -> ";
+const ARROW: &str = " -> ";
 
-/// Behind a serial monitor's time; a semicolon may end a row of MATLAB.
+/// The separator by which most of the fields are numbers; blanks if there is none. A semicolon may end a row of MATLAB.
 pub(crate) fn separator_of(text: &str) -> Option<char> {
-    let fields = text.split_once(ARROW).map_or(text, |(_, rest)| rest);
+    let fields = &text[words_before_values(text)..];
     let row = fields.trim_end_matches([';', ' ']);
     let is_ended = row.len() < fields.len() && (row.contains(char::is_whitespace) || row.matches(',').count() > 1);
     let fields = if is_ended { row } else { fields };
     // Every second part is quoted.
     let is_outside = |separator: &char| fields.split('"').step_by(2).any(|part| part.contains(*separator));
-    SEPARATORS.into_iter().find(is_outside)
+    let mut separators: Vec<Option<char>> = SEPARATORS.into_iter().filter(is_outside).map(Some).collect();
+    let share = |separator: Option<char>| {
+        let (mut count, mut numbers) = (0_usize, 0);
+        for field in Fields::new(fields, separator) {
+            count += 1;
+            numbers += usize::from(number(field).is_some() || with_unit(field).is_some());
+        }
+        numbers as f64 / count as f64
+    };
+    // Numbers between blanks may have decimal commas.
+    separators.extend((fields.contains(' ') && share(None) == 1.0).then_some(None));
+    if separators.len() < 2 {
+        return separators.pop().flatten();
+    }
+    // The first of equal ones.
+    separators.into_iter().rev().max_by(|one, other| share(*one).total_cmp(&share(*other))).flatten()
 }
+
+/// Bytes before the values of a line: a serial monitor's time, or what a log writes, such as `[12.5] INFO imu: `.
+fn words_before_values(text: &str) -> usize {
+    let start = text.find(ARROW).map_or(0, |at| at + ARROW.len());
+    let line = &text[start..];
+    let (mut end, mut at, mut last) = (0, 0, "");
+    for piece in line.split_inclusive(' ') {
+        let (before, word) = (&line[..at], piece.trim_end());
+        at += piece.len();
+        let has_letters = word.contains(char::is_alphabetic);
+        if word.ends_with(SEPARATORS) || has_letters && word.contains(SEPARATORS) {
+            break;
+        }
+        let is_word = (has_letters || word.ends_with(MARKS)) && number(word).is_none();
+        let is_in_brackets = word.starts_with('[') && word.ends_with(']');
+        if is_word || is_in_brackets || word == "-" && before.contains(" - ") {
+            (end, last) = (at, word);
+        }
+    }
+    let values = &line[end..];
+    let has_separator = values.contains(SEPARATORS);
+    let mut cells = values.split(|sign: char| SEPARATORS.contains(&sign) || !has_separator && sign == ' ');
+    // `sensor 1,0.5`: the number is part of a name.
+    let is_name = has_separator && !last.ends_with(MARKS) && !cells.clone().next().is_some_and(|of| of.contains('.'));
+    let are_several = has_separator || values.trim().contains(' ');
+    let are_numbers = are_several && !is_name && cells.all(|cell| number(cell.trim()).is_some());
+    start + if are_numbers { end } else { 0 }
+}
+
+/// Behind the words of a log.
+const MARKS: [char; 4] = [':', ']', '>', '='];
 
 pub(crate) fn split(text: &str, separator: Option<char>) -> Fields<'_> {
-    let separator = separator.map(|separator| separator as u8);
-    Fields { rest: Some(text), separator, has_arrow: text.contains(ARROW), list: None }
+    // Mostly numbers alone.
+    if !text.contains(' ') || !has_words(text) {
+        return Fields::new(text, separator);
+    }
+    let (words, values) = text.split_at(words_before_values(text));
+    let words = (!words.is_empty()).then(|| words.split_ascii_whitespace());
+    let has_units = separator.is_none() && has_units(values);
+    Fields { words, has_units, ..Fields::new(values, separator) }
 }
 
-/// One, or the length of a list in brackets.
+/// One, or the length of a list.
 pub(crate) fn list_lengths(text: &str, separator: Option<char>) -> Vec<usize> {
     let mut fields = split(text, separator);
     let mut lengths = Vec::new();
@@ -46,25 +99,39 @@ pub(crate) fn list_lengths(text: &str, separator: Option<char>) -> Vec<usize> {
 
 /// Fields, also quoted (RFC 4180). List elements are fields.
 pub(crate) struct Fields<'a> {
+    /// Of a log.
+    words: Option<SplitAsciiWhitespace<'a>>,
     rest: Option<&'a str>,
     /// ASCII; blanks if `None`.
     separator: Option<u8>,
-    /// A serial monitor's time may come first.
-    has_arrow: bool,
+    /// Units are behind blanks.
+    has_units: bool,
+    /// Commas separate no fields.
+    has_lists: bool,
     list: Option<&'a str>,
 }
 
 impl<'a> Fields<'a> {
+    fn new(text: &'a str, separator: Option<char>) -> Self {
+        let has_lists = separator != Some(',') && text.contains(',');
+        let separator = separator.map(|separator| separator as u8);
+        Self { words: None, rest: Some(text), separator, has_units: false, has_lists, list: None }
+    }
+
     fn cut(text: &'a str, separator: u8) -> (&'a str, Option<&'a str>) {
         let at = text.bytes().position(|byte| byte == separator);
         at.map_or((text, None), |at| (&text[..at], Some(&text[at + 1..])))
     }
 
+    /// In brackets, or between commas where these are no separators.
     fn first_of_list(&mut self, field: &'a str) -> &'a str {
-        if field.as_bytes().first() != Some(&b'[') {
-            return field;
-        }
-        let inner = field.strip_prefix('[').and_then(|field| field.strip_suffix(']')).map(str::trim);
+        let inner = if field.as_bytes().first() == Some(&b'[') {
+            field.strip_prefix('[').and_then(|field| field.strip_suffix(']')).map(str::trim)
+        } else {
+            let commas = if self.has_lists { field.matches(',').count() } else { 0 };
+            let is_number = || number(field).is_some();
+            (commas > 1 || commas == 1 && field.contains('.')).then_some(field).filter(|_| !is_number())
+        };
         let is_list = |inner: &&str| {
             let mut elements = inner.split([',', ' ']).filter(|element| !element.is_empty());
             elements.clone().count() > 1 && elements.all(|element| number(element).is_some())
@@ -102,19 +169,23 @@ impl<'a> Iterator for Fields<'a> {
         if let Some(list) = self.list.take() {
             return Some(self.next_of_list(list));
         }
-        let rest = self.rest.take()?;
-        if self.has_arrow {
-            if let Some((time, row)) = rest.split_once(ARROW) {
-                self.rest = Some(row);
-                return Some(time.trim());
+        if let Some(words) = &mut self.words {
+            match words.map(bare_word).find(|word| !word.is_empty()) {
+                Some(word) => return Some(word),
+                None => self.words = None,
             }
-            self.has_arrow = false;
         }
+        let rest = self.rest.take()?;
         let Some(separator) = self.separator else {
             let start = rest.trim_ascii_start();
-            let end = start.bytes().position(|byte| byte.is_ascii_whitespace()).unwrap_or(start.len());
-            self.rest = Some(&start[end..]);
-            return Some(delimited_text::field(&start[..end])).filter(|_| end > 0);
+            let mut end = word_end(start);
+            if self.has_units && number(&start[..end]).is_some() {
+                let after = start[end..].trim_ascii_start();
+                let unit = &after[..word_end(after)];
+                end = if is_unit(unit) { start.len() - after.len() + unit.len() } else { end };
+            }
+            self.rest = Some(&start[end..]).filter(|_| end > 0);
+            return (end > 0).then(|| self.first_of_list(delimited_text::field(&start[..end])));
         };
         if let Some((field, after)) = Self::quoted(rest) {
             self.rest = Self::cut(after, separator).1;
@@ -124,6 +195,47 @@ impl<'a> Iterator for Fields<'a> {
         self.rest = after;
         Some(self.first_of_list(delimited_text::field(field)))
     }
+}
+
+fn word_end(text: &str) -> usize {
+    text.bytes().position(|byte| byte.is_ascii_whitespace()).unwrap_or(text.len())
+}
+
+/// Without what a log puts around it.
+fn bare_word(word: &str) -> &str {
+    let word = word.trim_end_matches("->");
+    word.trim_start_matches(['[', '(', '<', '|']).trim_end_matches(|sign| MARKS.contains(&sign) || sign == ')')
+}
+
+fn is_unit(word: &str) -> bool {
+    number(word).is_none() && Unit::parse(word).is_some()
+}
+
+/// Letters other than those of an exponent, a bracket or an arrow; without branches, as most lines have none.
+fn has_words(text: &str) -> bool {
+    let bytes = text.as_bytes();
+    let is_word = |before: u8, byte: u8| {
+        let is_begin = byte.is_ascii_alphabetic() & !before.is_ascii_digit() & (before != b'.');
+        is_begin | (byte == b']') | (byte == b'>')
+    };
+    let first = bytes.first().is_some_and(|first| is_word(b' ', *first));
+    bytes.iter().zip(bytes.iter().skip(1)).fold(first, |any, (before, byte)| any | is_word(*before, *byte))
+}
+
+/// At least half of the numbers between blanks have one, as a single letter may be a state; and several where the numbers have names.
+fn has_units(text: &str) -> bool {
+    let (mut numbers, mut units, mut names, mut is_behind_number) = (0, 0, 0, false);
+    for word in text.split_ascii_whitespace() {
+        let is_name = word.ends_with(':') || word.contains('=');
+        if is_name && numbers > 0 {
+            return false;
+        }
+        names += usize::from(is_name);
+        units += usize::from(is_behind_number && is_unit(word));
+        is_behind_number = number(word).is_some();
+        numbers += usize::from(is_behind_number);
+    }
+    units > names && 2 * units >= numbers
 }
 
 /// Also with decimal comma, groups of digits, the exponent `D` of Fortran, as `0x1F`, or of a program's text: in brackets,
@@ -267,6 +379,13 @@ mod tests {
             ("1°,2°", Some(','), &["1°", "2°"]),
             ("5,\"[0.1, -2, nan]\",[7]", Some(','), &["5", "0.1", "-2", "nan", "[7]"]),
             ("[s];[1 2];x", Some(';'), &["[s]", "1", "2", "x"]),
+            ("5;0.1,-2,nan;x", Some(';'), &["5", "0.1", "-2", "nan", "x"]),
+            ("1.5 m/s^2 2 °/s\tx", None, &["1.5 m/s^2", "2 °/s", "x"]),
+            ("1.5 2 3 V", None, &["1.5", "2", "3", "V"]),
+            ("ax: 1 g ay: 2 g", None, &["ax:", "1", "g", "ay:", "2", "g"]),
+            ("[12.5] INFO imu: 1, 2", Some(','), &["12.5", "INFO", "imu", "1", "2"]),
+            ("sensor 1,2,3", Some(','), &["sensor 1", "2", "3"]),
+            ("imu ready: 5", None, &["imu", "ready:", "5"]),
         ] {
             assert_eq!(split(text, separator).collect::<Vec<_>>(), expected, "{text}");
         }
@@ -279,6 +398,11 @@ mod tests {
             ("0.5,\"[1, 2, 3]\",7", Some(','), &[1, 3, 1]),
             ("0.5;[1, 2, 3];7", Some(';'), &[1, 3, 1]),
             ("1 2", None, &[1, 1]),
+            ("1,5 2,5", None, &[1, 1]),
+            ("0,1;0,2;ok", Some(';'), &[1, 1, 1]),
+            ("1,2,3,a;b", Some(','), &[1, 1, 1, 1]),
+            ("5|0.1,0.2,0.3", Some('|'), &[1, 3]),
+            ("ax: 5, ay: 7", Some(','), &[1, 1]),
         ] {
             assert_eq!(separator_of(text), separator, "{text}");
             assert_eq!(list_lengths(text, separator), lengths, "{text}");

@@ -1,7 +1,6 @@
 //! Recognition of a format by content, and reading.
 
-use crate::columns::column_selection::{ColumnSelection, RowOptions};
-use crate::columns::sensor::SensorChannels;
+use crate::columns::{ColumnSelection, RowOptions, SensorChannels};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
 #[cfg(feature = "hdf5")]
 use crate::formats::hdf5::Hdf5Reader;
@@ -19,24 +18,16 @@ pub use crate::formats::topics::TopicDescription;
 use crate::formats::topics::{self, FileLimits, Source, TopicRows};
 use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
-use crate::input::budget::{Budget, Metered};
-use crate::input::delimited_text::{Lines, is_utf16};
-use crate::input::file_bytes::FileBytes;
-use crate::input::file_hash::FileHash;
-use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
-use crate::input::input_error::{InputError, Reason};
-use crate::input::read_monitor::{Counted, ReadMonitor};
-use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
+use crate::input::{
+    Budget, Counted, FileBytes, FileHash, GZIP_MAGIC, GzipMembers, InputError, Lines, Metered, ReadAhead, ReadMonitor,
+    Reason, ZSTD_MAGIC, ZstdFrames, is_utf16,
+};
 use crate::inspection::InspectedTable;
-use crate::rows::batch::RegisterField;
-use crate::rows::row_source::{FileRows, RowSource};
-use crate::rows::whole_table::WholeTable;
+use crate::rows::{FileRows, RegisterField, RowSource, WholeTable};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::thread;
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
@@ -399,42 +390,17 @@ fn no_bag() -> Reason {
 
 /// Interval of looking for a stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
-const PARTS: usize = 4;
-const PART_BYTES: usize = 1 << 16;
 
 /// A temporary copy of a pipe, until its end or a stop. A thread reads; after a stop it blocks until the process ends.
 fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::Result<NamedTempFile> {
     monitor.begin();
-    let (sender, parts) = mpsc::sync_channel::<io::Result<Vec<u8>>>(PARTS);
-    let mut input = Counted::new(input, monitor);
-    thread::spawn(move || {
-        loop {
-            let mut part = vec![0; PART_BYTES];
-            let read = match input.read(&mut part) {
-                Ok(0) => break,
-                Ok(count) => {
-                    part.truncate(count);
-                    Ok(part)
-                }
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => Err(error),
-            };
-            let is_failed = read.is_err();
-            if sender.send(read).is_err() || is_failed {
-                break;
-            }
-        }
-    });
+    let input = ReadAhead::new(Counted::new(input, monitor))?;
     let mut copy = NamedTempFile::new()?;
-    loop {
+    while let Some(part) = input.next_part(STOP_INTERVAL)? {
+        copy.write_all(&part)?;
         if monitor.take_stop() {
             monitor.cut();
             break;
-        }
-        match parts.recv_timeout(STOP_INTERVAL) {
-            Ok(part) => copy.write_all(&part?)?,
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => break,
         }
     }
     copy.flush()?;

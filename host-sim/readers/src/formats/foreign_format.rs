@@ -1,6 +1,6 @@
 //! Foreign binary files, and how to convert them.
 
-use crate::input::input_error::Reason;
+use crate::input::Reason;
 use std::fmt::Write;
 
 const FOREIGN: &[(&[u8], &str, &str)] = &[

@@ -1,13 +1,11 @@
 //! Datasets of HDF5 (MATLAB 7.3, `h5py`): matrices and tables of records, by path, in windows of rows.
 
-use crate::columns::unit::Unit;
+use crate::columns::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, Encoded, NamedArray, WantedColumns, stated_rate};
 use crate::formats::message_layout::Scalar;
 use crate::formats::topics::{EachRow, Stop};
-use crate::input::budget::{Budget, Meter};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
+use crate::input::{Budget, FileBytes, InputError, Meter, Reason};
+use crate::rows::Number;
 use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
 use std::collections::HashMap;
 use std::io::Read;

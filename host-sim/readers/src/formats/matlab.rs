@@ -3,10 +3,8 @@
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, WantedColumns};
 use crate::formats::message_layout::Scalar;
 use crate::formats::topics::{EachRow, Stop};
-use crate::input::budget::{Budget, Meter, Metered};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
+use crate::input::{Budget, FileBytes, InputError, Meter, Metered, Reason};
+use crate::rows::Number;
 use flate2::read::ZlibDecoder;
 use std::io::{self, BufReader, Read};
 

@@ -4,10 +4,9 @@ use crate::formats::mcap_file::{self, McapRecord};
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
-use crate::input::budget::Budget;
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::InputError;
+use crate::formats::topics::{EachRow, Offer, Source, Topic};
+use crate::input::{Budget, FileBytes, InputError};
+use crate::rows::Ending;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(crate) struct McapSource<'a> {
@@ -161,8 +160,7 @@ impl Source for McapSource<'_> {
 mod tests {
     use super::{Contents, McapSource};
     use crate::formats::topics::Source;
-    use crate::input::budget::Budget;
-    use crate::input::file_bytes::FileBytes;
+    use crate::input::{Budget, FileBytes};
     use std::path::Path;
 
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";

@@ -1,10 +1,7 @@
 //! Records of MCAP in the memory of one chunk. The crate `mcap` unpacks chunks by libraries in C.
 
 use crate::formats::topics::Stop;
-use crate::input::budget::{Budget, Meter, Metered};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::input::zstd_frames::ZstdFrames;
+use crate::input::{Budget, FileBytes, InputError, Meter, Metered, Reason, ZstdFrames};
 use flate2::Crc;
 use lz4_flex::frame::FrameDecoder;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -72,23 +69,33 @@ impl<'a> McapRecord<'a> {
     /// `None` for other types; an error if cut off.
     fn decode(opcode: u8, bytes: &'a [u8]) -> Result<Option<Self>, Reason> {
         let mut fields = Fields(bytes);
-        let record = match opcode {
-            op::SCHEMA => fields.schema(),
-            op::CHANNEL => {
-                let numbers = fields.number().zip(fields.number());
-                let texts = fields.text().zip(fields.text());
-                numbers.zip(texts).map(|((id, schema), (topic, encoding))| Self::Channel {
-                    id,
-                    schema,
-                    topic,
-                    encoding,
-                })
-            }
-            op::MESSAGE => fields.message(),
-            op::STATISTICS => fields.take(COUNTS_AT).and_then(|_| fields.bytes()).map(MessageCounts).map(Self::Counts),
-            _ => return Ok(None),
+        let mut record = || {
+            Some(Some(match opcode {
+                op::SCHEMA => Self::Schema {
+                    id: fields.number()?,
+                    name: fields.text()?,
+                    encoding: fields.text()?,
+                    definition: fields.bytes()?,
+                },
+                op::CHANNEL => Self::Channel {
+                    id: fields.number()?,
+                    schema: fields.number()?,
+                    topic: fields.text()?,
+                    encoding: fields.text()?,
+                },
+                op::MESSAGE => {
+                    let (channel, _sequence, log_ns) = (fields.number()?, fields.take(4)?, fields.take(8)?);
+                    let (log_ns, _published) = (u64::from_le_bytes(*log_ns.first_chunk()?), fields.take(8)?);
+                    Self::Message { channel, log_ns, data: fields.0 }
+                }
+                op::STATISTICS => {
+                    fields.take(COUNTS_AT)?;
+                    Self::Counts(MessageCounts(fields.bytes()?))
+                }
+                _ => return Some(None),
+            }))
         };
-        record.map(Some).ok_or_else(|| damaged("a record is cut off"))
+        record().ok_or_else(|| damaged("a record is cut off"))
     }
 }
 
@@ -103,18 +110,6 @@ impl<'a> Fields<'a> {
 
     fn number(&mut self) -> Option<u16> {
         Some(u16::from_le_bytes(*self.take(2)?.first_chunk()?))
-    }
-
-    fn schema(&mut self) -> Option<McapRecord<'a>> {
-        let (id, name, encoding) = (self.number()?, self.text()?, self.text()?);
-        Some(McapRecord::Schema { id, name, encoding, definition: self.bytes()? })
-    }
-
-    fn message(&mut self) -> Option<McapRecord<'a>> {
-        let (channel, _sequence) = (self.number()?, self.take(4)?);
-        let log_ns = u64::from_le_bytes(*self.take(8)?.first_chunk()?);
-        let _published = self.take(8)?;
-        Some(McapRecord::Message { channel, log_ns, data: self.0 })
     }
 
     fn bytes(&mut self) -> Option<&'a [u8]> {
@@ -256,8 +251,7 @@ fn records(mut bytes: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
 #[cfg(test)]
 mod tests {
     use super::{McapRecord, for_each_record};
-    use crate::input::budget::Budget;
-    use crate::input::file_bytes::FileBytes;
+    use crate::input::{Budget, FileBytes};
     use std::path::Path;
 
     fn record(opcode: u8, parts: &[&[u8]]) -> Vec<u8> {

@@ -1,11 +1,10 @@
 //! Arrays in memory, as of NumPy or Arrow.
 
-use crate::columns::unit::Unit;
+use crate::columns::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, WantedColumns};
 use crate::formats::topics::{EachRow, Stop};
-use crate::input::budget::Budget;
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
+use crate::input::{Budget, InputError, Reason};
+use crate::rows::Number;
 use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
@@ -84,12 +83,10 @@ impl ArrayReader for &MemoryTable {
 #[cfg(test)]
 mod tests {
     use super::{MemoryArray, MemoryColumn, MemoryTable, ROWS_AT_ONCE};
-    use crate::columns::column_selection::RowOptions;
-    use crate::columns::sensor::SensorChannels;
+    use crate::columns::{RowOptions, SensorChannels};
     use crate::formats::file_format::InputFile;
-    use crate::input::read_monitor::ReadMonitor;
-    use crate::rows::batch::Number;
-    use crate::rows::row_source::WantedRows;
+    use crate::input::ReadMonitor;
+    use crate::rows::{Number, WantedRows};
     use std::path::Path;
     use std::sync::Arc;
 

@@ -1,9 +1,8 @@
 //! Messages with defined fields, as in ROS and PX4: a column per number, such as `imu.angular_velocity.x` or `gyro[2]`.
 //! The first 16 floats of a sequence are columns; longer arrays than 64 are skipped.
 
-use crate::input::budget::Budget;
-use crate::input::input_error::Reason;
-use crate::rows::batch::Number;
+use crate::input::{Budget, Reason};
+use crate::rows::Number;
 use std::collections::HashMap;
 
 /// Longest array with columns.
@@ -379,7 +378,7 @@ impl<'a> Cursor<'a> {
 mod tests {
     use super::Encoding;
     use crate::formats::ros_definition::{RosVersion, layout};
-    use crate::rows::batch::Number;
+    use crate::rows::Number;
 
     /// 2065 in ROS 1; before 1970 in ROS 2.
     #[test]

@@ -1,6 +1,8 @@
-//! Sentences of NMEA 0183, `$NAME,field,…*68`, with the exclusive or between `$` and `*`.
+//! Sentences with a checksum of what is between their first sign and `*`: those of NMEA 0183, `$NAME,field,…*68`, by exclusive or,
+//! and NovAtel's ASCII logs, `#NAME,header…;field,…*1234abcd` or with `%`, by a CRC (OEM7 Commands and Logs Reference Manual, 1.1 and
+//! 1.10).
 
-use crate::columns::column_selection::AvailableColumn;
+use crate::columns::AvailableColumn;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sentence<'a> {
@@ -13,6 +15,14 @@ pub(crate) struct Sentence<'a> {
 impl<'a> Sentence<'a> {
     /// `None` for another line.
     pub(crate) fn parse(line: &'a str) -> Option<Self> {
+        if let Some(content) = line.strip_prefix(['#', '%']) {
+            let (content, digits) = content.split_once('*')?;
+            let stated = u32::from_str_radix(digits.trim_end(), 16).ok().filter(|_| digits.trim_end().len() == 8)?;
+            let (header, fields) = content.split_once(';')?;
+            let name = header.split(',').next().filter(|name| is_name(name))?;
+            let is_intact = stated == crc(content.as_bytes());
+            return Some(Self { name, fields: fields.split(',').map(str::trim).collect(), is_intact });
+        }
         let content = line.strip_prefix(['$', '!'])?;
         let (content, is_intact) = match content.rsplit_once('*') {
             Some((content, digits)) => {
@@ -22,9 +32,18 @@ impl<'a> Sentence<'a> {
             None => (content, true),
         };
         let (name, fields) = content.split_once(',')?;
-        let is_name = !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric());
-        is_name.then(|| Self { name, fields: fields.split(',').map(str::trim).collect(), is_intact })
+        is_name(name).then(|| Self { name, fields: fields.split(',').map(str::trim).collect(), is_intact })
     }
+}
+
+fn is_name(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric())
+}
+
+/// The polynomial of CRC-32, from 0 and without a final inversion.
+fn crc(bytes: &[u8]) -> u32 {
+    let shift = |crc: u32, _| crc >> 1 ^ if crc & 1 == 1 { 0xEDB8_8320 } else { 0 };
+    bytes.iter().fold(0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), shift))
 }
 
 /// Names by the manual, else numbers from 1.
@@ -34,7 +53,15 @@ pub(crate) fn columns(name: &str, width: usize) -> Vec<AvailableColumn> {
     const MAGNETIC: &[(&str, &str)] = &[("magn_x", "gauss"), ("magn_y", "gauss"), ("magn_z", "gauss")];
     const ACCELERATION: &[(&str, &str)] = &[("accl_x", "m/s^2"), ("accl_y", "m/s^2"), ("accl_z", "m/s^2")];
     const RATE: &[(&str, &str)] = &[("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
-    // VectorNav VN-100 (UM001), ASCII measurement messages.
+    // Seconds of a GPS week; increments of a sample, in counts or in rad and m/s.
+    const GPS: &[(&str, &str)] = &[("week", ""), ("time", "s")];
+    const COUNTS: &[(&str, &str)] =
+        &[("accl_z", ""), ("-accl_y", ""), ("accl_x", ""), ("gyro_z", ""), ("-gyro_y", ""), ("gyro_x", "")];
+    const INCREMENTS: &[(&str, &str)] =
+        &[("gyro_x", ""), ("gyro_y", ""), ("gyro_z", ""), ("accl_x", ""), ("accl_y", ""), ("accl_z", "")];
+    const STATUS: &[(&str, &str)] = &[("status", "")];
+    const TYPE: &[(&str, &str)] = &[("imu info", ""), ("imu type", "")];
+    // VectorNav VN-100 (UM001), ASCII measurement messages; NovAtel (SPAN on OEM6 Firmware Reference Manual).
     let parts: &[&[(&str, &str)]] = match name {
         "VNYMR" => &[ATTITUDE, MAGNETIC, ACCELERATION, RATE],
         "VNQMR" => &[QUATERNION, MAGNETIC, ACCELERATION, RATE],
@@ -43,6 +70,9 @@ pub(crate) fn columns(name: &str, width: usize) -> Vec<AvailableColumn> {
         "VNACC" => &[ACCELERATION],
         "VNGYR" => &[RATE],
         "VNMAG" => &[MAGNETIC],
+        "RAWIMUA" | "RAWIMUSA" => &[GPS, STATUS, COUNTS],
+        "RAWIMUXA" | "RAWIMUSXA" => &[TYPE, GPS, STATUS, COUNTS],
+        "CORRIMUDATAA" | "CORRIMUDATASA" | "IMURATECORRIMUSA" => &[GPS, INCREMENTS],
         _ => &[],
     };
     let known: Vec<AvailableColumn> =
@@ -69,7 +99,15 @@ mod tests {
         let damaged = line.replace("+006", "+007");
         assert!(!Sentence::parse(&damaged).expect("a sentence").is_intact);
         assert!(Sentence::parse("$GPGLL,4916.45,N,12311.12,W,225444,A,*1D").expect("a sentence").is_intact);
-        for line in ["", "$", "$VNYMR", "VNYMR,1*00", "$a b,1", "12,13"] {
+        // By the unit tests of NovAtel's own decoder.
+        let log = "%RAWIMUSXA,1692,484620.664;00,11,1692,484620.664389000,00801503,43110635,-817242,-202184,-215194,-41188,-9895*a5db8c7b";
+        let sentence = Sentence::parse(log).expect("a log");
+        assert_eq!((sentence.name, sentence.fields.len(), sentence.is_intact), ("RAWIMUSXA", 11, true));
+        assert!(!Sentence::parse(&log.replace("-9895", "-9896")).expect("a log").is_intact);
+        let column = &columns("RAWIMUSXA", 11)[9];
+        assert_eq!((column.name.as_str(), column.prefix_and_channel()), ("-gyro_y", Some(("-", "gyro_y"))));
+        for line in ["#t,x;y", "#A,1;2*1234567", "%A 1;2*12345678", "", "$", "$VNYMR", "VNYMR,1*00", "$a b,1", "12,13"]
+        {
             assert_eq!(Sentence::parse(line), None, "{line}");
         }
         let known = columns("VNYMR", 12);

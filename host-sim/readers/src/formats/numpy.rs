@@ -1,14 +1,11 @@
 //! Arrays of NumPy: `.npy` and `.npz`.
 
-use crate::columns::unit::Unit;
+use crate::columns::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, Encoded, NamedArray, WantedColumns};
 use crate::formats::numpy_header::{ElementType, Encoding, Header};
 use crate::formats::topics::{EachRow, Stop};
-use crate::input::budget::{Budget, Meter, Metered};
-use crate::input::file_bytes::{FileBytes, OpenBytes};
-use crate::input::input_error::{InputError, Reason};
-use crate::input::read_monitor::{Counted, ReadMonitor};
-use crate::rows::batch::Number;
+use crate::input::{Budget, Counted, FileBytes, InputError, Meter, Metered, OpenBytes, ReadMonitor, Reason};
+use crate::rows::Number;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use zip::ZipArchive;
 

@@ -1,8 +1,7 @@
 //! The header of a NumPy array (format 1.0 to 3.0), a literal of Python.
 
 use crate::formats::message_layout::Scalar;
-use crate::input::budget::too_deep;
-use crate::input::input_error::Reason;
+use crate::input::{Reason, too_deep};
 use serde_json::Value;
 use std::io::Read;
 
@@ -170,7 +169,7 @@ fn json(literal: &str) -> Result<String, Reason> {
 #[cfg(test)]
 mod tests {
     use super::{ElementType, Header};
-    use crate::input::input_error::Reason;
+    use crate::input::Reason;
 
     fn header(text: &str) -> Result<Header, Reason> {
         let length = u16::try_from(text.len()).expect("short").to_le_bytes();

@@ -1,7 +1,6 @@
 //! Samples of named numbers: a line each, lines that repeat their names, or a row for each value.
 
-use crate::columns::column_selection::AvailableColumn;
-use crate::columns::unit::Unit;
+use crate::columns::{AvailableColumn, Unit};
 use crate::formats::calendar;
 use crate::formats::fields::{number, separator_of, split};
 use crate::formats::labelled_row::{self, Record, pairs};

@@ -4,10 +4,9 @@
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Stop};
-use crate::input::budget::{Budget, Meter, Metered};
-use crate::input::file_bytes::{FileBytes, OpenBytes};
-use crate::input::input_error::{InputError, Reason};
+use crate::formats::topics::{EachRow, Offer, Source, Stop};
+use crate::input::{Budget, FileBytes, InputError, Meter, Metered, OpenBytes, Reason};
+use crate::rows::Ending;
 use bzip2::read::BzDecoder;
 use lz4_flex::frame::FrameDecoder;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,19 +27,20 @@ const CHUNK_INFO: u8 = 6;
 const CONNECTION: u8 = 7;
 
 enum Record<'a> {
-    /// The topic and the definition of a connection.
-    Connection(Connection),
+    Connection {
+        id: u32,
+        topic: String,
+        kind: String,
+        definition: String,
+    },
     /// Messages of each connection in a chunk.
     ChunkInfo(&'a [u8]),
     /// A message of a connection.
-    Message { connection: u32, recorded_ns: i64, data: &'a [u8] },
-}
-
-struct Connection {
-    id: u32,
-    topic: String,
-    kind: String,
-    definition: String,
+    Message {
+        connection: u32,
+        recorded_ns: i64,
+        data: &'a [u8],
+    },
 }
 
 type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
@@ -69,7 +69,7 @@ impl<'a> RosBagSource<'a> {
         let has_index = seek_index(&mut input).map_err(failed)?;
         let damage = for_each_record(file, &mut input, budget, &mut |record| {
             match record {
-                Record::Connection(Connection { id, topic, kind, definition }) => {
+                Record::Connection { id, topic, kind, definition } => {
                     let new = || FoundTopic { kind: kind.clone(), definition, connections: BTreeSet::new() };
                     let known = found.entry(topic).or_insert_with(new);
                     // Only the first type of a topic is read.
@@ -211,7 +211,7 @@ fn give(header: &[u8], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
             let text =
                 |of: &[u8], name: &[u8]| String::from_utf8_lossy(field(of, name).unwrap_or_default()).into_owned();
             let [kind, definition] = [&b"type"[..], b"message_definition"].map(|name| text(data, name));
-            Record::Connection(Connection { id, topic: text(header, b"topic"), kind, definition })
+            Record::Connection { id, topic: text(header, b"topic"), kind, definition }
         }
         (Some(CHUNK_INFO), _) => Record::ChunkInfo(data),
         _ => return Ok(()),
@@ -321,9 +321,7 @@ fn number(bytes: &[u8]) -> u64 {
 mod tests {
     use super::{CHUNK, CONNECTION, MAGIC, MESSAGE, RosBagSource};
     use crate::formats::topics::Source;
-    use crate::input::budget::Budget;
-    use crate::input::file_bytes::FileBytes;
-    use crate::input::input_error::Reason;
+    use crate::input::{Budget, FileBytes, Reason};
     use bzip2::Compression;
     use bzip2::write::BzEncoder;
     use lz4_flex::frame::FrameEncoder;

@@ -1,7 +1,7 @@
 //! Definitions of ROS 1 (bags) and ROS 2 (MCAP) as text.
 
 use crate::formats::message_layout::{Definitions, Field, FieldType, MessageLayout, Repeat, Scalar};
-use crate::input::input_error::Reason;
+use crate::input::Reason;
 
 /// With different headers, times, and types of one byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,7 +123,7 @@ fn field_type(kind: &str, owner: &str, version: RosVersion) -> FieldType {
 mod tests {
     use super::{RosVersion, known_layout, layout};
     use crate::formats::message_layout::{Encoding, MessageLayout};
-    use crate::rows::batch::Number;
+    use crate::rows::Number;
 
     /// Orientation, rate, force, each with covariance.
     fn doubles(big: bool) -> Vec<u8> {

@@ -1,11 +1,9 @@
 //! Rows of ROS messages: inertial columns and times.
 
-use crate::columns::column_selection::AvailableColumn;
-use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE};
 use crate::formats::message_layout::{Encoding, MessageColumn, MessageLayout};
 use crate::formats::topics::Topic;
-use crate::rows::batch::Number;
-use crate::rows::whole_table::TopicSensor;
+use crate::rows::{Number, TopicSensor};
 
 /// Fields of `sensor_msgs/Imu` in any message, with channels and units (REP 103).
 const VECTORS: [(&str, [&str; 3], &str); 2] =

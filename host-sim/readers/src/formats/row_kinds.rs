@@ -1,9 +1,9 @@
 //! Rows of several kinds, such as `ACC,…` and `GYR,…`, told by a field or by blanks.
 
-use crate::columns::column_selection::AvailableColumn;
+use crate::columns::AvailableColumn;
 use crate::formats::calendar;
 use crate::formats::fields::number;
-use crate::input::input_error::Reason;
+use crate::input::Reason;
 
 const MOST_KINDS: usize = 8;
 const LEAST_ROWS: usize = 2;

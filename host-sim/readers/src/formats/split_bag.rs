@@ -1,7 +1,8 @@
 //! A ROS 2 bag in a folder, perhaps split.
 
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
-use crate::input::input_error::InputError;
+use crate::formats::topics::{EachRow, Offer, Source, Topic};
+use crate::input::InputError;
+use crate::rows::Ending;
 use std::io;
 use std::path::{Path, PathBuf};
 

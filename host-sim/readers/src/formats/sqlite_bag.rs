@@ -3,11 +3,9 @@
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
-use crate::input::budget::{Budget, Metered};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
+use crate::formats::topics::{EachRow, Offer, Source, Topic};
+use crate::input::{Budget, FileBytes, InputError, Metered, Reason, ZSTD_MAGIC, ZstdFrames};
+use crate::rows::Ending;
 use rusqlite::{Connection, OpenFlags};
 use std::collections::HashMap;
 use std::io::{self, Read};
@@ -143,9 +141,7 @@ impl Source for SqliteSource<'_> {
 mod tests {
     use super::SqliteSource;
     use crate::formats::topics::Source;
-    use crate::input::budget::Budget;
-    use crate::input::file_bytes::FileBytes;
-    use crate::input::input_error::{InputError, Reason};
+    use crate::input::{Budget, FileBytes, InputError, Reason};
     use rusqlite::Connection;
     use tempfile::{TempDir, tempdir};
 

@@ -1,7 +1,6 @@
 //! The head of a text table: start of the rows, preamble, columns.
 
-use crate::columns::column_selection::{AvailableColumn, is_output_register};
-use crate::columns::unit::Unit;
+use crate::columns::{AvailableColumn, Unit, is_output_register};
 use crate::formats::calendar::{self, CalendarColumns};
 use crate::formats::fields::{list_lengths, number, separator_of, split, with_unit};
 use crate::formats::row_kinds::RowKind;
@@ -222,11 +221,14 @@ impl TableHead {
 struct Lists(Vec<usize>);
 
 impl Lists {
-    /// `gyro.0`, `gyro.1` of a list.
+    /// `gyro.0`, `gyro.1` of a list, unless its cell has as many names.
     fn names(&self, cells: &[&str]) -> Vec<String> {
         let mut names = Vec::with_capacity(cells.len());
         for (at, cell) in cells.iter().enumerate() {
             match self.0.get(at) {
+                Some(length) if *length > 1 && cell.split(',').count() == *length => {
+                    names.extend(cell.split(',').map(|name| name.trim().to_owned()));
+                }
                 Some(length) if *length > 1 => {
                     let (name, unit) = name_of_list(cell);
                     let unit = unit.map_or_else(String::new, |unit| format!(" [{}]", unit.name));
@@ -261,24 +263,36 @@ fn name_of_list(heading: &str) -> (String, Option<Unit>) {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FieldKind {
     Number,
+    Time,
     Missing,
+    Empty,
     Text,
 }
 
 impl FieldKind {
+    fn new(field: &str) -> Self {
+        let clock = || calendar::time_of_day(field).or_else(|| calendar::date_time(field));
+        let is_time = || clock().or_else(|| calendar::date(field)).is_some();
+        match number(field) {
+            Some(known) if known.value().is_nan() && field.is_empty() => Self::Empty,
+            Some(known) if known.value().is_nan() => Self::Missing,
+            None if with_unit(field).is_none() && !is_time() => Self::Text,
+            None if with_unit(field).is_none() => Self::Time,
+            _ => Self::Number,
+        }
+    }
+
+    fn is_missing(self) -> bool {
+        matches!(self, Self::Missing | Self::Empty)
+    }
+
     fn is_like(self, other: Self) -> bool {
-        self == other || self == Self::Missing || other == Self::Missing
+        self == other || self.is_missing() || other.is_missing()
     }
 }
 
 fn kinds_of_fields(text: &str) -> Vec<FieldKind> {
-    let kind = |field: &str| match number(field) {
-        Some(known) if known.value().is_nan() => FieldKind::Missing,
-        Some(_) => FieldKind::Number,
-        None if with_unit(field).is_some() => FieldKind::Number,
-        None => FieldKind::Text,
-    };
-    split(text, separator_of(text)).map(kind).collect()
+    split(text, separator_of(text)).map(FieldKind::new).collect()
 }
 
 /// True for words where `rows` have numbers, behind a first number: a row, and no heading.
@@ -422,21 +436,8 @@ pub(crate) fn is_row(text: &str) -> bool {
     if text.starts_with('{') && text.contains(':') {
         return false; // An object of names and numbers.
     }
-    let separator = separator_of(text);
-    let (mut numbers, mut missing, mut fields, mut named) = (0, 0, 0, 0);
-    for field in split(text, separator) {
-        fields += 1;
-        match number(field) {
-            Some(known) if known.value().is_nan() => {
-                missing += 1;
-                named += usize::from(!field.is_empty());
-            }
-            Some(_) => numbers += 1,
-            None => {
-                let is_time = calendar::time_of_day(field).is_some() || calendar::date_time(field).is_some();
-                numbers += usize::from(is_time || calendar::date(field).is_some() || with_unit(field).is_some());
-            }
-        }
-    }
-    numbers > 0 && 2 * numbers >= fields || named > 0 && missing == fields
+    let kinds = kinds_of_fields(text);
+    let numbers = kinds.iter().filter(|kind| matches!(kind, FieldKind::Number | FieldKind::Time)).count();
+    let is_all_missing = kinds.contains(&FieldKind::Missing) && kinds.iter().all(|kind| kind.is_missing());
+    numbers > 0 && 2 * numbers >= kinds.len() || is_all_missing
 }

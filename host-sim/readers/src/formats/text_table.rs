@@ -1,20 +1,14 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, RowOptions, SelectionError, as_they_are};
-use crate::columns::unit::{COUNT, Unit};
+use crate::columns::{AvailableColumn, COUNT, ChosenColumn, Role, RowOptions, SelectionError, Unit, as_they_are};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
 use crate::formats::fields::{leading_number, number, split, with_unit};
 use crate::formats::nmea::{self, Sentence};
 use crate::formats::records::{Records, Taken, values_of};
 use crate::formats::row_kinds::{RowKind, RowKinds};
 use crate::formats::table_head::{self, HEAD_LINES, Line, TableColumns, TableHead, is_row};
-use crate::input::delimited_text::{self, Lines};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::input::read_monitor::ReadMonitor;
-use crate::rows::batch::{Number, RowFault};
-use crate::rows::row_source::{EachRow, Ending, Refusal, RowSource};
-use crate::rows::whole_table::WholeTable;
+use crate::input::{FileBytes, InputError, Lines, ReadMonitor, Reason, delimited_text};
+use crate::rows::{EachRow, Ending, Number, Refusal, RowFault, RowSource, WholeTable};
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
@@ -288,7 +282,11 @@ impl Opened<'_> {
                 named.ok_or_else(|| file.error(unknown(topic)))?
             }
             None => {
-                let most = kinds.iter().filter(|(name, ..)| is_numeric(name)).max_by_key(|(.., count)| *count);
+                let is_of_sensor = |(name, width, _): &(String, usize, usize)| {
+                    nmea::columns(name, *width).iter().any(|column| column.prefix_and_channel().is_some())
+                };
+                let numeric = kinds.iter().filter(|(name, ..)| is_numeric(name));
+                let most = numeric.max_by_key(|kind| (is_of_sensor(kind), kind.2));
                 most.ok_or_else(|| file.error(Reason::NoNumbers))?
             }
         };

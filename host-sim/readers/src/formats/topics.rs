@@ -1,14 +1,8 @@
 //! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, RowOptions, as_they_are};
-use crate::columns::sensor::SensorChannels;
-use crate::columns::unit::Unit;
-use crate::input::budget::Budget;
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
-pub(crate) use crate::rows::row_source::Ending;
-use crate::rows::row_source::{self, Refusal, RowSource};
-use crate::rows::whole_table::{TopicSensor, WholeTable};
+use crate::columns::{AvailableColumn, ChosenColumn, ColumnSelection, RowOptions, SensorChannels, Unit, as_they_are};
+use crate::input::{Budget, InputError, Reason};
+use crate::rows::{self, Ending, Number, Refusal, RowSource, TopicSensor, WholeTable};
 use std::path::Path;
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -160,8 +154,10 @@ fn shape(topic: &Topic, sensor: Option<usize>) -> Vec<&'static str> {
 }
 
 fn choose(source: &dyn Source, options: &RowOptions) -> Result<Choice, Reason> {
-    let (topics, format) = (source.topics(), source.offer().format);
+    let Offer { format, topics, preferred, whole } = source.offer();
+    let format = *format;
     let known = sensors(topics);
+    let preferred = known.iter().find(|(name, _)| Some(name) == preferred.as_ref()).map(|(_, choice)| *choice);
     let names = |of: &[(String, Choice)]| of.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
     if topics.is_empty() {
         return Err(Reason::NoTopic { format });
@@ -176,19 +172,18 @@ fn choose(source: &dyn Source, options: &RowOptions) -> Result<Choice, Reason> {
         return sensor.or_else(|| topic().map(|topic| Choice { topic, sensor: None })).ok_or_else(unknown);
     }
     if options.selection.has_columns() {
-        if let Some(topic) = source.offer().whole {
+        if let Some(topic) = *whole {
             return Ok(Choice { topic, sensor: None });
         }
         // With the named columns.
         let has = |topic: &Topic| options.selection.is_covered(&topic.columns);
         let able: Vec<usize> = (0..topics.len()).filter(|&at| has(&topics[at])).collect();
-        let preferred = known.iter().find(|(name, _)| Some(name.as_str()) == source.offer().preferred.as_deref());
         return match (able.as_slice(), preferred) {
             ([topic], _) => Ok(Choice { topic: *topic, sensor: None }),
             ([], _) if topics.len() == 1 => Ok(Choice { topic: 0, sensor: None }),
             // The only sensor has the user's columns.
             ([], None) if known.len() == 1 => Ok(Choice { sensor: None, ..known[0].1 }),
-            (able, Some((_, choice))) if able.contains(&choice.topic) => Ok(Choice { sensor: None, ..*choice }),
+            (able, Some(choice)) if able.contains(&choice.topic) => Ok(Choice { sensor: None, ..choice }),
             ([], _) => Err(Reason::NoSensor { format, topics: describe(topics) }),
             (able, _) => {
                 let able: Vec<&str> = able.iter().map(|&at| topics[at].name.as_str()).collect();
@@ -196,16 +191,13 @@ fn choose(source: &dyn Source, options: &RowOptions) -> Result<Choice, Reason> {
             }
         };
     }
-    if let Some((_, choice)) = known.iter().find(|(name, _)| Some(name.as_str()) == source.offer().preferred.as_deref())
-    {
-        return Ok(*choice);
+    if let Some(choice) = preferred {
+        return Ok(choice);
     }
-    match (known.as_slice(), topics) {
+    match (known.as_slice(), topics.as_slice()) {
         ([(_, choice)], _) => Ok(*choice),
         ([], [_]) => Ok(Choice { topic: 0, sensor: None }),
-        ([], _) if source.offer().whole.is_some() => {
-            Ok(Choice { topic: source.offer().whole.unwrap_or(0), sensor: None })
-        }
+        ([], _) if whole.is_some() => Ok(Choice { topic: whole.unwrap_or(0), sensor: None }),
         ([], _) => Err(Reason::NoSensor { format, topics: describe(topics) }),
         (several, _) => Err(Reason::SeveralTopics(names(several))),
     }
@@ -319,7 +311,7 @@ impl RowSource for TopicRows<'_> {
         Some(self.limits.budget)
     }
 
-    fn read(&mut self, each: &mut row_source::EachRow) -> Result<Ending, InputError> {
+    fn read(&mut self, each: &mut rows::EachRow) -> Result<Ending, InputError> {
         let Self { file, source, topic, chosen, notes, limits } = self;
         let columns: Vec<usize> = chosen.iter().map(|column| column.position).collect();
         let (mut rows, mut is_enough) = (0u64, false);

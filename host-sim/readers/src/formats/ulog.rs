@@ -1,14 +1,10 @@
 //! ULog of PX4: sensors by message or FIFO, and any message. The crate `px4-ulog` follows nested formats without limit.
 
-use crate::columns::column_selection::AvailableColumn;
-use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE};
 use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
-use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
-use crate::input::budget::Budget;
-use crate::input::file_bytes::{FileBytes, OpenBytes};
-use crate::input::input_error::{InputError, Reason};
-use crate::rows::batch::Number;
-use crate::rows::whole_table::TopicSensor;
+use crate::formats::topics::{EachRow, Offer, Source, Topic};
+use crate::input::{Budget, FileBytes, InputError, OpenBytes, Reason};
+use crate::rows::{Ending, Number, TopicSensor};
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::rc::Rc;
@@ -455,7 +451,7 @@ fn format(text: &[u8]) -> Option<(String, Vec<Field>)> {
 #[cfg(test)]
 mod tests {
     use super::{MOST_WAITING, Pairing};
-    use crate::rows::batch::Number;
+    use crate::rows::Number;
 
     fn sample(time_us: i64, value: f64) -> [Number; 4] {
         [Number::Integer(time_us), Number::Real(value), Number::Real(value + 1.0), Number::Real(value + 2.0)]

@@ -1,7 +1,6 @@
 //! Limits on the reading of a file, which grow with its size: bytes, numbers, nesting, time.
 
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::Reason;
+use crate::input::{FileBytes, Reason};
 use std::borrow::BorrowMut;
 use std::io::{self, Read};
 use std::time::{Duration, Instant};
@@ -148,7 +147,7 @@ impl<R: Read, M: BorrowMut<Meter>> Read for Metered<R, M> {
 #[cfg(test)]
 mod tests {
     use super::{BYTES_OF_ANY, BYTES_PER_BYTE, Budget, MOST_LEVELS, Metered, VALUES_OF_ANY, VALUES_PER_BYTE};
-    use crate::input::input_error::Reason;
+    use crate::input::Reason;
     use std::io::Read;
 
     #[test]

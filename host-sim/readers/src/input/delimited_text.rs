@@ -1,13 +1,11 @@
 //! Lines of a plain or gzip file with an editor's line numbers. The crate `csv` counts blank lines and CR LF wrongly.
 
-use crate::input::budget::{Budget, Metered};
-use crate::input::file_bytes::FileBytes;
-use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
-use crate::input::input_error::{InputError, Reason};
-use crate::input::read_ahead::ReadAhead;
-use crate::input::read_monitor::{Counted, ReadMonitor};
-use crate::input::threads::may_begin_threads;
-use crate::input::utf16_reader::Utf16Reader;
+use crate::input::{
+    Budget, Counted, FileBytes, GZIP_MAGIC, GzipMembers, InputError, Metered, ReadAhead, ReadMonitor, Reason,
+    may_begin_threads,
+};
+use encoding_rs::{UTF_16BE, UTF_16LE};
+use encoding_rs_io::DecodeReaderBytesBuilder;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::PathBuf;
 
@@ -64,7 +62,7 @@ impl Lines {
         let compressed = start.starts_with(&GZIP_MAGIC);
         let is_utf16 = is_utf16(&start);
         monitor.begin();
-        let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
+        let counted = Counted::new(Cursor::new(start.clone()).chain(raw), monitor);
         let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
         let bytes: Box<dyn Read + Send> = if compressed {
             let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?;
@@ -76,7 +74,9 @@ impl Lines {
             }
         } else if is_utf16 {
             // In Windows programs.
-            Box::new(Utf16Reader::new(whole).map_err(|e| fail(Reason::Io(e)))?)
+            let is_big_endian = start.starts_with(b"\xFE\xFF") || start[0] == 0;
+            let encoding = if is_big_endian { UTF_16BE } else { UTF_16LE };
+            Box::new(DecodeReaderBytesBuilder::new().encoding(Some(encoding)).build(whole))
         } else {
             Box::new(whole)
         };
@@ -308,5 +308,34 @@ pub fn time(text: &str) -> Result<f64, Reason> {
         Ok(time) if time.is_finite() => Ok(time),
         Ok(_) => Err(Reason::NotFinite(quote(text))),
         Err(_) => Err(Reason::NotNumber(quote(text))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Lines;
+    use crate::input::FileBytes;
+    use std::path::Path;
+
+    fn lines(bytes: &[u8]) -> Vec<String> {
+        let mut lines = Lines::open(&FileBytes::in_memory(Path::new("rows.txt"), bytes)).expect("text");
+        std::iter::from_fn(|| lines.next_line().expect("a line").map(|(_, text)| text.to_owned())).collect()
+    }
+
+    /// Characters of one and two units at every place of a buffer, halves of pairs alone, and a byte too many.
+    #[test]
+    fn text_in_utf_16_is_what_was_written() {
+        for shift in 0..4 {
+            let written = vec![format!("begin 1{}a°語😀", "x".repeat(shift)); 9000];
+            let text = written.join("\n");
+            for to_bytes in [u16::to_le_bytes, u16::to_be_bytes] {
+                let marked: Vec<u8> = std::iter::once(0xFEFF).chain(text.encode_utf16()).flat_map(to_bytes).collect();
+                assert!(lines(&marked) == written && lines(&marked[2..]) == written, "{shift}");
+            }
+        }
+        assert_eq!(lines(&[0xFF, 0xFE]), [""; 0]);
+        assert_eq!(lines(&[0xFF, 0xFE, 0x00, 0xDC, b'a', 0]), ["\u{FFFD}a"]);
+        assert_eq!(lines(&[0xFF, 0xFE, b'a', 0, 0x3D, 0xD8]), ["a\u{FFFD}"]);
+        assert_eq!(lines(&[0xFE, 0xFF, 0, b'a', 0]), ["a\u{FFFD}"]);
     }
 }

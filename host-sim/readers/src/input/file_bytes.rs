@@ -1,6 +1,6 @@
 //! Re-readable bytes: file, copy or memory.
 
-use crate::input::input_error::{InputError, Reason};
+use crate::input::{InputError, Reason};
 use std::fs::{self, File};
 use std::io::{self, Cursor, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

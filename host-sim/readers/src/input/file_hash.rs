@@ -1,7 +1,6 @@
 //! SHA-256 of a file.
 
-use crate::input::file_bytes::{FileBytes, OpenBytes};
-use crate::input::threads::may_begin_threads;
+use crate::input::{FileBytes, OpenBytes, may_begin_threads};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Read};

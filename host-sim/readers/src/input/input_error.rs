@@ -1,7 +1,6 @@
 //! Errors of an input file: place and reason.
 
-use crate::columns::column_selection::SelectionError;
-use crate::columns::printable::Printable;
+use crate::columns::{Printable, SelectionError};
 use std::borrow::Cow;
 use std::fmt;
 use std::io;
@@ -115,7 +114,7 @@ impl Reason {
         matches!(self, Self::TooManySamples | Self::Limit(_))
     }
 
-    /// A [`Metered`](crate::input::budget::Metered) refusal, or the error itself.
+    /// A [`Metered`](crate::input::Metered) refusal, or the error itself.
     pub(crate) fn from_io(error: io::Error) -> Self {
         match error.downcast::<Self>() {
             Ok(reason) => reason,

@@ -2,8 +2,9 @@
 
 use std::io::{self, ErrorKind, Read};
 use std::panic::resume_unwind;
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 const PART_BYTES: usize = 1 << 16;
 const PARTS_AHEAD: usize = 4;
@@ -23,14 +24,17 @@ impl ReadAhead {
         let read_all = move || {
             loop {
                 let mut part = vec![0; PART_BYTES];
-                let (count, error) = fill(&mut input, &mut part);
-                part.truncate(count);
-                let is_wanted = send.send(Ok(part)).is_ok();
-                if let Some(error) = error {
-                    // The caller is gone.
-                    let _ = send.send(Err(error));
-                }
-                if count < PART_BYTES || !is_wanted {
+                let read = match input.read(&mut part) {
+                    Ok(0) => return,
+                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                    read => read,
+                };
+                let is_failed = read.is_err();
+                let read = read.map(|count| {
+                    part.truncate(count);
+                    part
+                });
+                if send.send(read).is_err() || is_failed {
                     return;
                 }
             }
@@ -38,20 +42,15 @@ impl ReadAhead {
         let thread = Some(thread::Builder::new().spawn(read_all)?);
         Ok(Self { parts, thread, part: Vec::new(), read: 0 })
     }
-}
 
-/// Bytes read, and the error.
-fn fill(input: &mut impl Read, buffer: &mut [u8]) -> (usize, Option<io::Error>) {
-    let mut filled = 0;
-    while filled < buffer.len() {
-        match input.read(&mut buffer[filled..]) {
-            Ok(0) => break,
-            Ok(count) => filled += count,
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return (filled, Some(error)),
+    /// The next bytes of a pipe, none if there are none within `wait`; `None` at the end.
+    pub(crate) fn next_part(&self, wait: Duration) -> io::Result<Option<Vec<u8>>> {
+        match self.parts.recv_timeout(wait) {
+            Ok(part) => part.map(Some),
+            Err(RecvTimeoutError::Timeout) => Ok(Some(Vec::new())),
+            Err(RecvTimeoutError::Disconnected) => Ok(None),
         }
     }
-    (filled, None)
 }
 
 impl Read for ReadAhead {

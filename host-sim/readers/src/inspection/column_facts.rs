@@ -1,10 +1,7 @@
 //! Facts of a column's numbers.
 
-use crate::columns::column_selection::AvailableColumn;
-use crate::columns::unit::Unit;
-use crate::rows::batch::usual_unit;
-use crate::rows::quantizer::{difference_noise, step};
-use crate::rows::whole_table::WholeColumn;
+use crate::columns::{AvailableColumn, Unit};
+use crate::rows::{WholeColumn, difference_noise, step, usual_unit};
 
 const MOST_BACKWARDS: f64 = 0.01;
 /// Ratio of the halves' rates: gaps.

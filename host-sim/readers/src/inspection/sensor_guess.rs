@@ -1,13 +1,11 @@
 //! Inertial columns by format, names or numbers.
 
-use crate::columns::column_selection::{AvailableColumn, ColumnSelection, known_by_name};
-use crate::columns::sensor::SensorChannels;
-use crate::columns::unit::{COUNT, SECOND, Unit};
-use crate::columns::{ACCELEROMETER, GYROSCOPE};
+use crate::columns::{
+    ACCELEROMETER, AvailableColumn, COUNT, ColumnSelection, GYROSCOPE, SECOND, SensorChannels, Unit, known_by_name,
+};
 use crate::inspection::column_facts::{ColumnFacts, time_unit};
 use crate::inspection::unit_guess::{self, UnitGuess};
-use crate::rows::batch::usual_unit;
-use crate::rows::whole_table::{TopicSensor, WholeTable};
+use crate::rows::{TopicSensor, WholeTable, usual_unit};
 use std::collections::BTreeMap;
 use time_base::TimeRange;
 

@@ -2,7 +2,7 @@
 
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
-use crate::rows::quantizer::{MEDIAN_OF_NORMAL, noise_at_lag};
+use crate::rows::{MEDIAN_OF_NORMAL, noise_at_lag};
 use std::ops::Range;
 
 /// Rows of a block, and most correlation lengths.

@@ -1,11 +1,7 @@
 //! Batches of rows, column by column.
 
-use crate::columns::column_selection::{ChosenColumn, Role};
-use crate::columns::sensor::SensorChannel;
-use crate::columns::unit::{SECOND, Unit};
-use crate::columns::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
-use crate::input::budget::{Budget, Meter};
-use crate::input::input_error::Reason;
+use crate::columns::{ACCELEROMETER, ChosenColumn, GYROSCOPE, MAGNETOMETER, Role, SECOND, SensorChannel, Unit};
+use crate::input::{Budget, Meter, Reason};
 use std::ops::Range;
 use time_base::{Order, ROWS_OF_FIRST, ROWS_OF_SET_CLOCK, StampOrder};
 
@@ -42,11 +38,11 @@ impl Number {
     }
 }
 
-/// A channel and its numbers.
+/// A channel `C`, and its numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ValueColumn {
+pub struct ValueColumn<C = SensorChannel> {
     /// Its LSB is not that of the numbers.
-    pub channel: SensorChannel,
+    pub channel: C,
     /// For 1, in the channel's unit.
     pub factor: f64,
     pub label: String,

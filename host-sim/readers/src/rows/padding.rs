@@ -1,6 +1,6 @@
 //! Equal rows at either end: erased memory or a held value.
 
-use crate::rows::batch::{Batch, RowBefore};
+use crate::rows::{Batch, RowBefore};
 
 /// Fewest rows, and ratio to equal rows within.
 const LEAST_ROWS: u64 = 64;
@@ -81,7 +81,7 @@ impl PaddingFinder {
 #[cfg(test)]
 mod tests {
     use super::{PaddingFinder, Unpadded};
-    use crate::rows::batch::Batch;
+    use crate::rows::Batch;
 
     fn found(values: &[f64], batch_rows: usize) -> Option<Unpadded> {
         let mut finder = PaddingFinder::default();

@@ -1,10 +1,8 @@
 //! Rows of any format as batches.
 
-use crate::columns::column_selection::{ChosenColumn, Role};
-use crate::input::budget::Budget;
-use crate::input::input_error::{InputError, Reason, StreamError};
-use crate::input::read_monitor::ReadMonitor;
-use crate::rows::batch::{Batch, BatchBuilder, HELD_ROWS, Number, RegisterField, RowFault, ValueColumn, usual_unit};
+use crate::columns::{ChosenColumn, Role};
+use crate::input::{Budget, InputError, ReadMonitor, Reason, StreamError};
+use crate::rows::{Batch, BatchBuilder, HELD_ROWS, Number, RegisterField, RowFault, ValueColumn, usual_unit};
 use std::path::Path;
 use time_base::TimeBaseError;
 use time_base::TimeRange;

@@ -1,10 +1,8 @@
 //! Whole columns of a source.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
-use crate::columns::unit::Unit;
-use crate::input::input_error::InputError;
-use crate::rows::batch::BatchBuilder;
-use crate::rows::row_source::{Refusal, RowSource};
+use crate::columns::{AvailableColumn, ChosenColumn, Unit};
+use crate::input::InputError;
+use crate::rows::{BatchBuilder, Refusal, RowSource};
 use std::path::Path;
 
 /// 128 MiB.

@@ -153,7 +153,7 @@ pub fn record<P: Read + Write>(
         return Err(SerialRecordingError::Duration(seconds));
     }
     let mut recorder: Option<RawStreamRecorder> = None;
-    let bursts = |recorder: &Option<RawStreamRecorder>| recorder.as_ref().map_or(0, RawStreamRecorder::bursts);
+    let bursts = |recorder: &Option<RawStreamRecorder>| recorder.as_ref().map_or(0, |recorder| recorder.bursts);
     link.send_command("w 1").map_err(SerialRecordingError::Port)?;
     let mut silent_since = Instant::now();
     let mut asked = silent_since;
@@ -197,8 +197,7 @@ pub fn record<P: Read + Write>(
     };
     let mut finished = Ok(());
     if let Some(recorder) = recorder {
-        (summary.bursts, summary.missing, summary.restarts) =
-            (recorder.bursts(), recorder.missing(), recorder.restarts());
+        (summary.bursts, summary.missing, summary.restarts) = (recorder.bursts, recorder.missing, recorder.restarts);
         finished = recorder.finish().map_err(SerialRecordingError::Log);
     }
     // The log is good up to here.
@@ -350,19 +349,9 @@ impl<W: Write> RawStreamRecorder<W> {
         self.first_us.zip(last_us).map_or(0.0, |(first, last)| seconds(last.saturating_sub(first)))
     }
 
-    /// Bursts in the log.
-    pub fn bursts(&self) -> u64 {
-        self.bursts
-    }
-
     /// Sample periods without a burst, except during restarts.
     pub fn missing(&self) -> u64 {
         self.missing
-    }
-
-    /// Restarts of the device.
-    pub fn restarts(&self) -> u64 {
-        self.restarts
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn refusal(column: &ProfiledColumn, value: f64, verdict: Option<&Verd
         Some(verdict) if verdict.refused.is_empty() => None,
         Some(verdict) => refusal_of_register(channel(column.register)?, value, *verdict),
         None if value.is_infinite() => Some("not_finite"),
-        None if (value * column.factor).abs() > largest_value(&column.profile) => Some("out_of_range"),
+        None if (value * column.factor).abs() > largest_value(&column.channel) => Some("out_of_range"),
         None => None,
     }
 }
@@ -51,12 +51,12 @@ fn largest_value(profile: &ChannelProfile) -> f64 {
 }
 
 /// Evenly spread runs of a column's numbers, NaN between; all up to 2¹⁷.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct ColumnSurvey {
     values: Vec<f64>,
-    /// Numbers, and stride of the kept runs.
+    /// Numbers, and times that every other run was dropped.
     seen: usize,
-    stride: usize,
+    thinned: u32,
     is_usable: bool,
     has_other_than_zero: bool,
     /// Numbers that are refused, by cause.
@@ -64,17 +64,6 @@ pub(crate) struct ColumnSurvey {
 }
 
 impl ColumnSurvey {
-    pub(crate) fn new() -> Self {
-        Self {
-            values: Vec::new(),
-            seen: 0,
-            stride: 1,
-            is_usable: false,
-            has_other_than_zero: false,
-            refused: BTreeMap::new(),
-        }
-    }
-
     /// Sets refused numbers to NaN.
     pub(crate) fn add(&mut self, column: &ProfiledColumn, values: &mut [f64], verdicts: &[Verdict]) {
         for (row, value) in values.iter_mut().enumerate() {
@@ -90,8 +79,8 @@ impl ColumnSurvey {
         while !rest.is_empty() {
             let (run, after) = rest.split_at(rest.len().min(RUN - self.seen % RUN));
             if self.is_kept() && self.values.len() == MOST_KEPT {
-                self.thin();
-                self.stride *= 2;
+                self.values = self.values.chunks(RUN).step_by(2).flatten().copied().collect();
+                self.thinned += 1;
             }
             if self.is_kept() {
                 self.values.extend_from_slice(run);
@@ -109,18 +98,13 @@ impl ColumnSurvey {
         self.is_usable && !self.has_other_than_zero
     }
 
-    /// True in a kept run; the stride is a power of two.
+    /// True in a kept run.
     fn is_kept(&self) -> bool {
-        (self.seen / RUN) & (self.stride - 1) == 0
-    }
-
-    fn thin(&mut self) {
-        let kept = self.values.chunks(RUN).step_by(2).flatten().copied().collect();
-        self.values = kept;
+        (self.seen / RUN).is_multiple_of(1 << self.thinned)
     }
 
     fn values(&self) -> Vec<f64> {
-        if self.stride == 1 {
+        if self.thinned == 0 {
             return self.values.clone();
         }
         let run = |run: &[f64]| run.iter().copied().chain([f64::NAN]).collect::<Vec<f64>>();

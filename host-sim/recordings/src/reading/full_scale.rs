@@ -28,7 +28,7 @@ impl FullScale {
         let none = |value: f64| Extreme { value, first_row: 0, count: 0 };
         let of_column = |column: &ProfiledColumn| {
             // Larger numbers are at full scale too.
-            let range = column.profile.range.map(|range| range * (1.0 - HALF_COUNT) / column.factor);
+            let range = column.channel.range.map(|range| range * (1.0 - HALF_COUNT) / column.factor);
             [none(range.unwrap_or(f64::NEG_INFINITY)), none(range.map_or(f64::INFINITY, |range| -range))]
         };
         Self { extremes: columns.iter().take(MOST_COLUMNS).map(of_column).collect(), rows: BTreeMap::new() }
@@ -63,7 +63,7 @@ impl FullScale {
                 let extreme = &mut self.extremes[at][side];
                 let is_beyond = if side == 0 { number > extreme.value } else { number < extreme.value };
                 let bit = 1u128 << (2 * at + side);
-                if is_beyond && column.profile.range.is_none() {
+                if is_beyond && column.channel.range.is_none() {
                     *extreme = Extreme { value: number, first_row: row, count: 1 };
                     mask |= bit;
                     forget(&mut self.rows, bit);
@@ -96,7 +96,7 @@ impl FullScale {
             let is_full = |side: usize| {
                 let of_16_bits = [MAX_16_BITS, MIN_16_BITS][side];
                 let is_at_end = is_in_16_bits && counts[side] == Some(of_16_bits);
-                extremes[side].count > 0 && (column.profile.range.is_some() || is_at_end)
+                extremes[side].count > 0 && (column.channel.range.is_some() || is_at_end)
             };
             let full: Vec<usize> = (0..2).filter(|side| is_full(*side)).collect();
             full.iter().for_each(|side| mask |= 1 << (2 * at + side));
@@ -104,7 +104,7 @@ impl FullScale {
             if let Some(first) = full.iter().map(|side| extremes[*side].first_row).min() {
                 notes.push(format!(
                     "{}: {count} samples at full scale, the first of them row {}",
-                    column.profile.name,
+                    column.channel.name,
                     first + 1
                 ));
             }
@@ -116,7 +116,7 @@ impl FullScale {
 
 /// Supply and temperature without a range are often constant.
 fn is_watched(column: &ProfiledColumn) -> bool {
-    column.profile.range.is_some() || column.profile.quantity.is_inertial()
+    column.channel.range.is_some() || column.channel.quantity.is_inertial()
 }
 
 fn forget(rows: &mut BTreeMap<u128, u64>, bit: u128) {
@@ -137,8 +137,8 @@ mod tests {
     use readers::ColumnQuantizer;
 
     fn found(range: Option<f64>, rows: &[[f64; 2]]) -> (u64, Vec<String>) {
-        let profile = ChannelProfile { range, ..ChannelProfile::generic("gyro_x", Quantity::AngularRate) };
-        let column = ProfiledColumn { profile, factor: 1.0, label: String::new(), register: None };
+        let channel = ChannelProfile { range, ..ChannelProfile::generic("gyro_x", Quantity::AngularRate) };
+        let column = ProfiledColumn { channel, factor: 1.0, label: String::new(), register: None };
         let columns = [column.clone(), column];
         let mut scale = FullScale::new(&columns);
         for (row, numbers) in rows.iter().enumerate() {

@@ -163,12 +163,13 @@ impl SampleStream {
     }
 
     fn open(mut origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
-        let survey = Survey::read(&origin, reading, u64::MAX, monitor);
+        let survey = SurveyPass { origin: &origin, reading, most_rows: u64::MAX, monitor }.survey();
         let mut survey = survey.or_else(|error| match &mut origin {
             // A stated rate needs no times, which may be the fault.
             Origin::File { options, .. } if reading.stated_hz.is_some() => {
                 options.selection = std::mem::take(&mut options.selection).without_time();
-                let Ok(mut survey) = Survey::read(&origin, reading, u64::MAX, monitor) else { return Err(error) };
+                let pass = SurveyPass { origin: &origin, reading, most_rows: u64::MAX, monitor };
+                let Ok(mut survey) = pass.survey() else { return Err(error) };
                 survey.read.notes.push(format!("the time stamps are ignored: {error}"));
                 Ok(survey)
             }
@@ -241,8 +242,8 @@ impl SampleStream {
             }
             Ok(())
         };
-        if survey.has_all_rows {
-            survey.kept.iter().try_for_each(|batch| give(&mut placer, Some(batch.clone())))?;
+        if survey.kept.has_all_rows {
+            survey.kept.batches.iter().try_for_each(|batch| give(&mut placer, Some(batch.clone())))?;
         } else {
             monitor.begin_pass(ReadPass::Samples);
             let wanted = reading.wanted(survey.read.rows);
@@ -254,7 +255,7 @@ impl SampleStream {
                 give(&mut placer, Some(batch))
             })?;
             if read.is_stopped && read.rows < survey.read.rows {
-                *survey = Survey::read(origin, *reading, read.rows, monitor)?;
+                *survey = SurveyPass { origin, reading: *reading, most_rows: read.rows, monitor }.survey()?;
                 survey.read.is_stopped = true;
                 *samples = survey.samples(reading.kept)?;
                 return Ok(false);
@@ -442,55 +443,48 @@ struct Survey {
     full_scale: u64,
     full_scale_notes: Vec<String>,
     read: RowsRead,
-    kept: VecDeque<Batch>,
-    has_all_rows: bool,
-    rows: u64,
+    kept: Kept,
 }
 
-impl Survey {
-    /// Reads up to `most_rows`, without padding.
-    fn read(origin: &Origin, reading: Reading, most_rows: u64, monitor: &ReadMonitor) -> Result<Self, StreamError> {
+/// A reading of up to `most_rows`.
+#[derive(Clone, Copy)]
+struct SurveyPass<'a> {
+    origin: &'a Origin<'a>,
+    reading: Reading,
+    most_rows: u64,
+    monitor: &'a ReadMonitor,
+}
+
+impl SurveyPass<'_> {
+    /// Without padding.
+    fn survey(self) -> Result<Survey, StreamError> {
         let mut padding = PaddingFinder::default();
-        let survey = Self::read_kept(origin, reading, most_rows, monitor, Unpadded::ALL, &mut padding);
+        let survey = self.unpadded(Unpadded::ALL, &mut padding);
         let Some(unpadded) = padding.finish() else { return survey };
-        let mut survey = Self::read_kept(origin, reading, most_rows, monitor, unpadded, &mut PaddingFinder::default())?;
+        let mut survey = self.unpadded(unpadded, &mut PaddingFinder::default())?;
         survey.read.padding = unpadded.first + padding.rows() - unpadded.end;
         survey.read.notes.push(unpadded.note(padding.rows()));
         Ok(survey)
     }
 
     /// Reads again if fewer rows than expected have to be kept.
-    fn read_kept(
-        origin: &Origin,
-        reading: Reading,
-        most_rows: u64,
-        monitor: &ReadMonitor,
-        unpadded: Unpadded,
-        padding: &mut PaddingFinder,
-    ) -> Result<Self, StreamError> {
-        let read = |kept: Kept, padding: &mut PaddingFinder| {
-            Self::read_rows(origin, reading.wanted(most_rows), kept, monitor, unpadded, padding)
-        };
-        let kept = Kept { is_by_expectation: reading.part.is_none(), ..Kept::new(reading.kept) };
-        let survey = read(kept, padding)?;
-        let is_as_expected = survey.has_all_rows || survey.rows > reading.kept.most_rows();
-        if is_as_expected { Ok(survey) } else { read(Kept::new(reading.kept), &mut PaddingFinder::default()) }
+    fn unpadded(self, unpadded: Unpadded, padding: &mut PaddingFinder) -> Result<Survey, StreamError> {
+        let new = || Kept::new(self.reading.kept);
+        let kept = Kept { is_by_expectation: self.reading.part.is_none(), ..new() };
+        let survey = self.rows(kept, unpadded, padding)?;
+        let is_as_expected = survey.kept.has_all_rows || survey.kept.rows > self.reading.kept.most_rows();
+        if is_as_expected { Ok(survey) } else { self.rows(new(), unpadded, &mut PaddingFinder::default()) }
     }
 
-    fn read_rows(
-        origin: &Origin,
-        wanted: WantedRows,
-        mut kept: Kept,
-        monitor: &ReadMonitor,
-        unpadded: Unpadded,
-        padding: &mut PaddingFinder,
-    ) -> Result<Self, StreamError> {
+    fn rows(self, mut kept: Kept, unpadded: Unpadded, padding: &mut PaddingFinder) -> Result<Survey, StreamError> {
+        let Self { origin, reading, most_rows, monitor } = self;
+        let wanted = reading.wanted(most_rows);
         monitor.begin_pass(ReadPass::FirstRows);
         let mut source = origin.open()?;
         let columns: Vec<ProfiledColumn> = source.columns().to_vec();
         let stated_hz = wanted.stated_hz.or(source.rate_hz());
         let mut placer = Placer::new(Clock::new(stated_hz)?, columns.len());
-        let mut surveys = vec![ColumnSurvey::new(); columns.len()];
+        let mut surveys = vec![ColumnSurvey::default(); columns.len()];
         let mut full_scale = FullScale::new(&columns);
         let mut rows_before = 0u64;
         // NaN if refused.
@@ -535,7 +529,7 @@ impl Survey {
         dropped.remove("gap");
         let sample_rate_hz = clock.rate_hz(totals.samples, totals.periods(), &dropped)?;
         let columns = columns.into_iter().zip(surveys).zip(quantizers);
-        Ok(Self {
+        Ok(Survey {
             columns: columns
                 .map(|((column, survey), quantizer)| StreamedColumn { column, survey, quantizer })
                 .collect(),
@@ -550,15 +544,15 @@ impl Survey {
             full_scale,
             full_scale_notes,
             read,
-            has_all_rows: kept.has_all_rows,
-            rows: kept.rows,
-            kept: kept.batches,
+            kept,
         })
     }
+}
 
+impl Survey {
     fn samples(&mut self, limit: KeptInMemory) -> Result<SurveyedSamples, StreamError> {
         let has_room = limit.has_room(self.totals.samples, self.totals.periods());
-        let is_in_memory = self.has_all_rows && has_room;
+        let is_in_memory = self.kept.has_all_rows && has_room;
         let before = if is_in_memory { u64::MAX } else { BEGINNING };
         let mut off_step = vec![false; self.columns.len()];
         let mut beginning = self.measurement(before, &mut off_step)?;
@@ -569,7 +563,7 @@ impl Survey {
         }
         let description = self.description();
         if is_in_memory {
-            self.kept = VecDeque::new();
+            self.kept.batches.clear();
             beginning.dropped.clone_from(&description.dropped);
             beginning.flagged.clone_from(&description.flagged);
         }
@@ -601,10 +595,10 @@ impl Survey {
             } else {
                 "has no usable value"
             };
-            notes.push(format!("{} ({}) {what}, and is left out", column.profile.name, column.label));
+            notes.push(format!("{} ({}) {what}, and is left out", column.channel.name, column.label));
         }
         notes.extend(self.missing_notes());
-        let rounded = self.columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
+        let rounded = self.columns.iter().filter_map(|of| Some((&of.column.channel, of.quantizer.as_ref()?)));
         notes.extend(rounding_note(rounded));
         notes.extend(self.stamps.iter().flat_map(StampQuality::notes));
         notes.extend(self.clock.note().map(str::to_owned));
@@ -623,7 +617,7 @@ impl Survey {
                     // Reports count register faults.
                     _ => continue,
                 };
-                channels.entry((what, *count, survey.rows())).or_default().push(column.profile.name);
+                channels.entry((what, *count, survey.rows())).or_default().push(column.channel.name);
             }
         }
         let note = |((what, count, rows), names): ((&str, u64, usize), Vec<&str>)| {
@@ -661,8 +655,8 @@ impl Survey {
             flagged: BTreeMap::new(),
         };
         let mut placer = Placer::new(self.clock.again()?, self.columns.len());
-        let end = self.has_all_rows.then_some(None);
-        for batch in self.kept.iter().cloned().map(Some).chain(end) {
+        let end = self.kept.has_all_rows.then_some(None);
+        for batch in self.kept.batches.iter().cloned().map(Some).chain(end) {
             for rows in placer.place(batch)? {
                 append(&mut measurement, self.block(&rows, off_step), &rows.times);
             }
@@ -679,7 +673,7 @@ impl Survey {
 /// All-zero vectors beside others: unfilled fields.
 fn never_filled(columns: &[ProfiledColumn], surveys: &[ColumnSurvey]) -> Vec<usize> {
     let of_group = |group: &[&str; 3]| -> Vec<usize> {
-        let is_own = |at: &usize| group.contains(&columns[*at].profile.name) && columns[*at].register.is_none();
+        let is_own = |at: &usize| group.contains(&columns[*at].channel.name) && columns[*at].register.is_none();
         let own: Vec<usize> = (0..columns.len()).filter(is_own).collect();
         if own.len() == group.len() && own.iter().all(|at| surveys[*at].is_zero()) { own } else { Vec::new() }
     };
@@ -706,7 +700,7 @@ fn append(measurement: &mut Measurement, block: SampleBlock, times_s: &[f64]) {
 impl StreamedColumn {
     fn profile(&self) -> Option<ChannelProfile> {
         let lsb = self.quantizer.as_ref()?.lsb * self.column.factor;
-        Some(ChannelProfile { lsb, ..self.column.profile })
+        Some(ChannelProfile { lsb, ..self.column.channel })
     }
 
     /// Sets `off_step` for a number off the step.
@@ -808,7 +802,8 @@ pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measur
 pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
     let (origin, monitor) = (Origin::Recording(Cow::Borrowed(recording)), ReadMonitor::default());
     let reading = Reading::new(rate_hz, KeptInMemory::ALL);
-    let mut survey = Survey::read(&origin, reading, u64::MAX, &monitor).map_err(without_file)?;
+    let pass = SurveyPass { origin: &origin, reading, most_rows: u64::MAX, monitor: &monitor };
+    let mut survey = pass.survey().map_err(without_file)?;
     let samples = survey.samples(reading.kept).map_err(without_file)?;
     Ok(EstimatedTimeBase { measurement: samples.beginning, stamps: survey.stamps })
 }

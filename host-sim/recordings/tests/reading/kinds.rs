@@ -195,7 +195,7 @@ fn rows_of_different_origin_are_several_sensors() {
 type WriteRow = fn(f64, [f64; 3]) -> String;
 
 /// Text before the rows, the rows, and text behind them.
-const ROWS_OF_PROGRAMS: [(&str, WriteRow, &str); 19] = [
+const ROWS_OF_PROGRAMS: [(&str, WriteRow, &str); 33] = [
     (
         "time_s,gx,gy,gz,note\n",
         |t, [x, y, z]| format!("{t:.2},{x:.4},{y:.4},{z:.4},{:.3}\n", x - 1.5).replace('-', "\u{2212}"),
@@ -278,6 +278,36 @@ const ROWS_OF_PROGRAMS: [(&str, WriteRow, &str); 19] = [
         },
         "",
     ),
+    // Units behind blanks.
+    (
+        "time gyro_x gyro_y gyro_z\n",
+        |t, [x, y, z]| format!("{t:.2} s {:.1} mdeg/s {y:.4} deg/s {z:.4} deg/s\n", 1e3 * x),
+        "",
+    ),
+    (
+        "t_s gx gy gz state\n",
+        |t, [x, y, z]| format!("{t:.2}\t{x:.4} °/s {y:.4} °/s  {z:.4} °/s OK\n").replace('\t', " "),
+        "",
+    ),
+    // A state that is a unit's letter.
+    ("t_s gx gy gz state\n", |t, [x, y, z]| format!("{t:.2} {x:.4} {y:.4} {z:.4} V\n"), ""),
+    // Words of a log before the values.
+    ("", |t, [x, y, z]| format!("[{:.3}] gyro {x:.4} {y:.4} {z:.4}\n", 1.7e9 + t), ""),
+    ("", |t, [x, y, z]| format!("INFO imu: {t:.2}, {x:.4}, {y:.4}, {z:.4}\n"), ""),
+    ("", |t, [x, y, z]| format!("[INFO] [{:.3}] [imu]: {x:.4}, {y:.4}, {z:.4}\n", 1.7e9 + t), ""),
+    ("", |t, [x, y, z]| format!("[{:12.6}] imu: {x:.4},{y:.4},{z:.4}\n", 90.0 + t), ""),
+    ("", |t, [x, y, z]| format!("[2024-05-13 10:00:{:06.3}] gyro {x:.4} {y:.4} {z:.4}\n", t), ""),
+    (
+        "",
+        |t, [x, y, z]| format!("2024-05-13 10:00:{:06.3} INFO imu - {x:.4} {y:.4} {z:.4}\n", t).replacen('.', ",", 1),
+        "",
+    ),
+    ("", |t, [x, y, z]| format!("10:00:{:06.3} -> gyro: {x:.4},{y:.4},{z:.4}\n", t), ""),
+    // A separator, and another one in its cells.
+    ("t_s;gx,gy,gz;state\n", |t, [x, y, z]| format!("{t:.2};{x:.4},{y:.4},{z:.4};ok\n"), ""),
+    ("t_s|gyro|state\n", |t, [x, y, z]| format!("{t:.2}|{x:.4},{y:.4},{z:.4}|ok\n"), ""),
+    ("t_s,gx,gy,gz,state\n", |t, [x, y, z]| format!("{t:.2},{x:.4},{y:.4},{z:.4},ready;armed\n"), ""),
+    ("t_s gx gy gz\n", |t, [x, y, z]| format!("{t:.2} {x:.4} {y:.4} {z:.4}\n").replace('.', ","), ""),
 ];
 
 #[test]
@@ -295,6 +325,46 @@ fn rows_are_read_as_programs_write_them() {
         for channel in ["gyro_x", "gyro_y", "gyro_z"] {
             assert!(is_near(read, channel, RATE), "{kind}: {} {proposal:?}", read.neighbours(channel));
         }
+    }
+}
+
+/// Raw increments between other logs, with sums by the method of the manual; a wrong sum is a missing sample.
+#[test]
+fn ascii_logs_of_novatel_are_read() {
+    let sum = |content: &str| {
+        content.bytes().fold(0_u32, |sum, byte| {
+            (0..8).fold(sum ^ u32::from(byte), |sum, _| if sum & 1 == 1 { sum >> 1 ^ 0xEDB8_8320 } else { sum >> 1 })
+        })
+    };
+    for (seed, name, begin) in
+        [(1, "#RAWIMUSXA,COM1,0,81.5,FINESTEERING", "00,11,1692,"), (2, "%RAWIMUSA,1692,484620.664", "1692,")]
+    {
+        let mut normal = normal(seed);
+        let (mut content, mut wrong) = (String::new(), 0);
+        for row in 0..ROWS {
+            let [x, y, z] = [(); 3].map(|()| (1000.0 * RATE * normal()).round());
+            let time = 484_620.0 + f64::from(row) / 100.0 + 2e-5 * normal();
+            let log = format!("{};{begin}{time:.9},00801503,98066,3,-2,{z},{y},{x}", &name[1..]);
+            let is_wrong = row % 500 == 7;
+            wrong += usize::from(is_wrong);
+            content += &format!("{}{log}*{:08x}\r\n", &name[..1], sum(&log) ^ u32::from(is_wrong));
+            let position =
+                "BESTPOSA,COM1,0,83.5,FINESTEERING,1692,336148.000,00000040,6145,2724;SOL_COMPUTED,51.1,-114.0";
+            content += &format!("#{position}*{:08x}\r\n<OK\r\n", sum(position));
+        }
+        let options = ["--units", "0.001*deg/s,0.00001*g", "--rate", "100"];
+        let read = text("span.ascii", &content, &options);
+        assert_eq!(read.samples.len() as u32 + read.missing() as u32, ROWS, "{name}: {:?}", read.notes);
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_y", RATE), "{name}");
+        assert!(read.notes_contain(&format!("{wrong} sentences whose checksum is wrong")), "{:?}", read.notes);
+        // Without the size of a count.
+        let error =
+            super::harness::read("span.ascii", content.as_bytes(), &[""; 0]).err().expect("no unit").to_string();
+        assert!(error.contains("no unit of ") && error.contains("--units"), "{error}");
+        let (_, found) = as_proposed(content.as_bytes(), &[]);
+        let [(proposal, read)] = found.as_slice() else { panic!("{} sensors", found.len()) };
+        assert!(proposal.doubts.iter().any(|doubt| doubt.contains("counts of an unknown size")), "{proposal:?}");
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6);
     }
 }
 
