@@ -41,6 +41,7 @@ fn counts_have_the_size_that_the_sensor_states() {
 }
 
 /// A column of doubles that the program holds.
+#[derive(Debug)]
 struct Doubles(Vec<f64>);
 
 impl MemoryColumn for Doubles {
@@ -67,7 +68,7 @@ fn arrays_of_one_length_are_a_table_of_several_batches() {
     let mut reader = file.rows(&RowOptions::of_sensor(SensorChannels::generic()), &|_| None).expect("columns by name");
     let names: Vec<&str> = reader.columns().iter().map(|column| column.channel.name).collect();
     assert_eq!(names, ["gyro_x", "gyro_y", "gyro_z"]);
-    let (mut batches, mut times, mut last) = (0, Vec::new(), Vec::new());
+    let (mut batches, mut times, mut last) = (0, Vec::new(), Vec::<f64>::new());
     let read = reader.read(WantedRows::all(None), &mut |batch| {
         batches += 1;
         times.extend(batch.times);
