@@ -43,6 +43,7 @@ PACKAGES=(--package adis16405-driver --package allan-core --package time-base --
 run cargo package --locked --allow-dirty --no-verify --quiet "${PACKAGES[@]}" --target-dir "$TARGET"
 version=$(sed -n '/^\[workspace.package\]/,/^$/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 for package in "$TARGET/package"/*-"$version".crate; do tar -xzf "$package" -C "$work"; done
+RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --all-features "${PACKAGES[@]}" --target-dir "$TARGET/doc"
 check adis16405-driver 1.85
 check allan-core 1.88
 check time-base 1.95

@@ -59,9 +59,6 @@ FEATURES=(--locked --workspace --features
     adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt)
 # Clippy checks every crate of the workspace that is compiled, including the images that the tests build.
 export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/lint.sh CARGO_INCREMENTAL=0
-# What the host runs while it compiles for a microcontroller is compiled as for the tests, so that one copy serves both.
-ALIKE=(--config 'profile.dev.lto="off"' --config profile.dev.build-override.debug-assertions=false
-    --config profile.dev.build-override.overflow-checks=false)
 nextest() { run "$TARGET/python/bin/cargo-nextest" nextest run "${FEATURES[@]}" --show-progress none "$@"; }
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 debian() {
@@ -127,7 +124,7 @@ format() {
 }
 build() {
     nextest --no-run
-    (cd tests/tools && run cargo programs --target-dir "$TARGET") # the tests start them
+    (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
     export IMUNOISE=$TARGET/debug/imunoise # the program as just built
 }
 examples() { # workspaces that share frameworks, which are compiled once for each core
@@ -138,7 +135,7 @@ examples() { # workspaces that share frameworks, which are compiled once for eac
         (
             unset RUSTC_WORKSPACE_WRAPPER
             cd "$workspace"
-            run cargo clippy "${ALIKE[@]}" --locked --target "$core" --target-dir "$TARGET" -- -D warnings
+            run cargo clippy --locked --target "$core" --target-dir "$TARGET/examples" -- -D warnings
         )
     done
 }
@@ -155,8 +152,7 @@ page() { # the tests open it
     run "$TARGET/debug/build-page" --quick "$BROWSER_PAGE" "$TARGET/browser-test.uf2"
 }
 documentation() {
-    RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --all-features \
-        --package adis16405-driver --package allan-core --package time-base --package readers
+    RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --package adis16405-driver --package allan-core --all-features
     run cargo test --quiet --doc "${FEATURES[@]}" 2>&1 | tee -a "$log"
 }
 dependencies() {
@@ -202,7 +198,7 @@ peers() {
     (
         unset RUSTC_WORKSPACE_WRAPPER
         cd tests/peers
-        run cargo clippy "${ALIKE[@]}" --locked --all-targets --target-dir "$TARGET" -- -D warnings
+        run cargo clippy --locked --all-targets --target-dir "$TARGET/peers" -- -D warnings
     )
 }
 recordings() {

@@ -66,12 +66,12 @@ pub fn host_sim() -> PathBuf {
 
 /// The path of a program of the workspace `tests/tools`, which is built if it does not exist.
 pub fn tool(name: &str) -> PathBuf {
-    let target = target_folder();
+    let target = target_folder().join("programs");
     let mut build = cargo();
     build.current_dir(workspace().join("tests/tools")).args(["programs", "--target-dir"]).arg(&target);
     let status = build.status().expect("cargo runs");
     assert!(status.success(), "{name} does not build");
-    target.join("debug").join(name)
+    target.join("release").join(name)
 }
 
 /// A program for a microcontroller.

@@ -1,6 +1,6 @@
 //! `cargo run -p browser -- [--quick] [FOLDER [UF2]]` builds the page. FOLDER/index.html has the program beside it, for a web server;
 //! FOLDER/observatory.html has everything in one file, to be opened from a disk. FOLDER is `target/browser` if not given. UF2 is the image
-//! of the Pico that the page offers. `--quick` compiles as for the tests: faster, but a larger and slower program.
+//! of the Pico that the page offers. `--quick` builds faster, but a larger and slower program.
 
 use clap::ValueEnum;
 use flate2::Compression;
@@ -22,8 +22,9 @@ const STYLE: &str = include_str!("../page/style.css");
 const SCRIPT: &str = concat!(include_str!("../page/page.js"), include_str!("../page/device.js"));
 const WORKER: &str = include_str!("../page/worker.js");
 const TARGET: &str = "wasm32-unknown-unknown";
-/// Profile of cargo for users of the page.
+/// Profiles of cargo: one for users of the page, and one for fast builds.
 const PROFILE: &str = "browser";
+const QUICK_PROFILE: &str = "quick";
 /// Names of the program and of the image of the Pico beside the page. The program is compressed, since some servers do
 /// not compress it.
 const PROGRAM: &str = "observatory.wasm.gz";
@@ -43,8 +44,9 @@ const FEATURES: [&str; 6] = [
 fn main() -> ExitCode {
     let (options, mut paths): (VecDeque<OsString>, VecDeque<OsString>) =
         env::args_os().skip(1).partition(|of| *of == "--quick");
+    let profile = if options.is_empty() { PROFILE } else { QUICK_PROFILE };
     let mut path = || paths.pop_front().map(PathBuf::from);
-    match run(path(), path(), !options.is_empty()) {
+    match run(path(), path(), profile) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -53,12 +55,12 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(folder: Option<PathBuf>, image: Option<PathBuf>, is_quick: bool) -> Result<(), Box<dyn Error>> {
+fn run(folder: Option<PathBuf>, image: Option<PathBuf>, profile: &str) -> Result<(), Box<dyn Error>> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
     let folder = folder.unwrap_or_else(|| target.join("browser"));
     let image = image.map(|file| read(&file)).transpose()?;
-    let program = compressed(&build(&workspace, &target, is_quick)?)?;
+    let program = compressed(&build(&workspace, &target, profile)?)?;
     fs::create_dir_all(&folder)?;
     let image_inside = image.as_ref().map(|image| Ok::<_, io::Error>(base64(&compressed(image)?))).transpose()?;
     let image_beside = image.as_ref().map(|_| IMAGE);
@@ -86,11 +88,10 @@ fn compressed(content: &[u8]) -> io::Result<Vec<u8>> {
     compressed.finish()
 }
 
-/// Compiles the library for browsers.
-fn build(workspace: &Path, target: &Path, is_quick: bool) -> Result<Vec<u8>, Box<dyn Error>> {
-    // A folder of its own for the profile of that name, since the page is written to `target/browser`.
-    let (profile, folder, target) =
-        if is_quick { ("dev", "debug", target.to_owned()) } else { (PROFILE, PROFILE, target.join("browser-build")) };
+/// Compiles the library for browsers in a profile of cargo.
+fn build(workspace: &Path, target: &Path, profile: &str) -> Result<Vec<u8>, Box<dyn Error>> {
+    // A separate folder: cargo, which runs this program, may hold the lock of its own.
+    let target = target.join("browser-build");
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
         .env_remove("RUSTC_WORKSPACE_WRAPPER")
@@ -102,8 +103,8 @@ fn build(workspace: &Path, target: &Path, is_quick: bool) -> Result<Vec<u8>, Box
     if !status.success() {
         return Err(format!("the page does not build; its target comes with: rustup target add {TARGET}").into());
     }
-    let program = target.join(TARGET).join(folder).join("browser.wasm");
-    Ok(read(&if is_quick { program } else { optimized(program, &target.join("optimizer"))? })?)
+    let program = target.join(TARGET).join(profile).join("browser.wasm");
+    Ok(read(&if profile == QUICK_PROFILE { program } else { optimized(program, &target.join("optimizer"))? })?)
 }
 
 /// Returns the program optimized by `wasm-opt`, which npm installs once in `folder`. Without npm it prints a note and returns the program
