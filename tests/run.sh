@@ -162,21 +162,12 @@ dependencies() {
             check licenses bans sources
     done
 }
-python() { # with the packages of tests/requirements.txt
-    local python=$TARGET/python/bin unpacked=$TARGET/unpacked-wheel pip
+python() { # with the packages of tests/requirements.txt; one wheel, compiled as the tests are, so that dependencies are compiled once
+    local python=$TARGET/python/bin pip
     pip=("$python/pip" --quiet --disable-pip-version-check)
-    rm -rf "$TARGET/wheels" "$unpacked"
-    if [ ${#chosen[@]} != 0 ]; then # --long: as for a release, which compiles everything again
-        PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET run "${pip[@]}" wheel --config-settings build-args="--profile dev" \
-            --no-build-isolation --no-deps --wheel-dir "$TARGET/wheels" ./host-sim/python
-    else # maturin's metadata, around a library of the crates that are compiled for the tests
-        PYO3_BUILD_EXTENSION_MODULE=1 run cargo build --quiet "${FEATURES[@]}" --lib --tests
-        (cd host-sim/python && run "$python/maturin" --quiet pep517 write-dist-info --metadata-directory "$unpacked")
-        cp -r host-sim/python/package/imunoise "$unpacked/"
-        cp "$TARGET/debug/lib_native.so" "$unpacked/imunoise/_native.abi3.so"
-        mkdir -p "$TARGET/wheels"
-        run "$python/wheel" pack "$unpacked" --dest-dir "$TARGET/wheels"
-    fi
+    rm -f "$TARGET"/wheels/*.whl
+    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET run "${pip[@]}" wheel --config-settings build-args="--profile dev" \
+        --no-build-isolation --no-deps --wheel-dir "$TARGET/wheels" ./host-sim/python
     run "${pip[@]}" install --no-deps --force-reinstall "$TARGET"/wheels/imunoise-*.whl
     local marks=(-m "not cluster")
     if [ ${#chosen[@]} != 0 ]; then # --long
