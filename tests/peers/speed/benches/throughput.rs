@@ -1,6 +1,6 @@
 //! Time per sample: singly and in slices, at several lengths of the record, and with the optional statistics.
 //!
-//! `cargo bench --manifest-path tests/peers/Cargo.toml`; criterion prints the time of 1,000 samples and their rate.
+//! `cargo bench -p speed --manifest-path tests/peers/Cargo.toml`; criterion prints the time of 1,000 samples and their rate.
 
 #[path = "../../../../allan-core/tests/support/late_state.rs"]
 mod late_state;
