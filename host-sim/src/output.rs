@@ -3,7 +3,7 @@
 use crate::cli::OutputArguments;
 use crate::output_files::{OutputFiles, is_standard_stream};
 use crate::output_format::{OutputFile, OutputFormat};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
 use recordings::Printable;
@@ -16,6 +16,7 @@ use reports::terminal::Screen;
 use reports::{full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
+use std::cell::LazyCell;
 use std::fmt;
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
@@ -95,7 +96,7 @@ pub(crate) fn write_report(
 ) -> Result<()> {
     let Analysed { report, reading } = analysed;
     let (mut written, mut pages) = (Ok(()), Vec::new());
-    let noise = |format, file: &Path| write_noise(&SavedReport::new(report)?, format, file, output.axis, files);
+    let saved = LazyCell::new(|| SavedReport::new(report));
     for target in &output.outputs {
         let OutputFile { format, file } = target;
         let result = match format {
@@ -107,7 +108,10 @@ pub(crate) fn write_report(
             OutputFormat::Figures => figure::pictures(report)
                 .into_iter()
                 .try_for_each(|Picture { name, svg }| write_text(&svg, &figure_file(file, &name), files)),
-            OutputFormat::Noise(format) => noise(*format, file),
+            OutputFormat::Noise(format) => match &*saved {
+                Ok(saved) => write_noise(saved, *format, file, output.axis, files),
+                Err(error) => Err(anyhow!("{error}")),
+            },
         };
         written = written.and(result);
     }

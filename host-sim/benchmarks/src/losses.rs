@@ -39,7 +39,7 @@ pub struct LossPlan {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LossTable {
     pub rate_hz: f64,
-    /// Of a complete record.
+    /// Length of a complete record.
     pub samples: usize,
     pub noises: Vec<LossyNoise>,
 }

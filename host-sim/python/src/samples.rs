@@ -17,8 +17,8 @@ const BLOCK: usize = 4096;
 /// 1.3·10⁻⁶. Differences then have few bits, which are squared in half of the time.
 const SINGLE_PRECISION: f64 = 256.0;
 
-/// The automatic step of an array of this many samples is that of one stretch in so many, each of so many samples: their deviation is known
-/// to 1 %, and the step is a power of two.
+/// The automatic step of an array of this many samples is that of one stretch in so many, each of so many samples. Their deviation is known
+/// to 1 %, and the step is a power of two. If no neighbours in them differ, all samples are taken.
 const LONG: usize = 1 << 17;
 const APART: usize = 16;
 const STRETCH: usize = 64;
@@ -70,9 +70,9 @@ macro_rules! dtypes {
                 match self {
                     $(Self::$name(values) => {
                         let step: f64 = $step?;
-                        let apart = if values.len() < LONG { 1 } else { APART };
-                        let quantizer = Quantizer::for_samples(stretches(values, apart))
-                            .or_else(|| Quantizer::for_samples(stretches(values, 1)))?;
+                        let apart = if values.len() < LONG { &[1][..] } else { &[APART, 1] };
+                        let quantizer =
+                            apart.iter().find_map(|&apart| Quantizer::for_samples(stretches(values, apart)))?;
                         Some((quantizer.origin(), quantizer.lsb() * step))
                     })*
                 }
@@ -257,7 +257,7 @@ fn check_missing(value: impl Sample, quantizer: Option<Quantizer>, index: u64) -
     }
 }
 
-/// The samples of one stretch in `apart`; NaN follows each, so that no difference is taken between two of them.
+/// The samples of one stretch in `apart`. NaN follows each unless the next one does, so that no difference is taken across a gap.
 fn stretches<T: Sample>(values: ArrayView1<T>, apart: usize) -> impl Iterator<Item = f64> {
     let ends = if apart == 1 { 0 } else { 1 };
     (0..values.len()).step_by(STRETCH * apart).flat_map(move |start| {

@@ -28,7 +28,7 @@ pub struct PredictedScatter {
     pub tau_s: f64,
     /// By equation (6) of the paper, `1/√(2(N/n − 1))`.
     pub formula: f64,
-    /// Of the overlapped estimate, `1/√(2·edf)`.
+    /// By the degrees of freedom of the overlapped estimate, `1/√(2·edf)`.
     pub confidence: f64,
     /// Fractions of N, B and K in the true Allan variance before the filter.
     pub shares: [f64; 3],

@@ -15,6 +15,8 @@ const MISSING: [&str; 22] = [
 
 /// Between time and line in the Arduino serial monitor.
 const ARROW: &str = " -> ";
+/// Behind the words of a log.
+const MARKS: [char; 4] = [':', ']', '>', '='];
 
 /// The separator by which most of the fields are numbers; blanks if there is none. A semicolon may end a row of MATLAB.
 pub(crate) fn separator_of(text: &str) -> Option<char> {
@@ -70,9 +72,6 @@ fn words_before_values(text: &str) -> usize {
     start + if are_numbers { end } else { 0 }
 }
 
-/// Behind the words of a log.
-const MARKS: [char; 4] = [':', ']', '>', '='];
-
 pub(crate) fn split(text: &str, separator: Option<char>) -> Fields<'_> {
     // Mostly numbers alone.
     if !text.contains(' ') || !has_words(text) {
@@ -99,7 +98,7 @@ pub(crate) fn list_lengths(text: &str, separator: Option<char>) -> Vec<usize> {
 
 /// Fields, also quoted (RFC 4180). List elements are fields.
 pub(crate) struct Fields<'a> {
-    /// Of a log.
+    /// The words that a log writes before the values.
     words: Option<SplitAsciiWhitespace<'a>>,
     rest: Option<&'a str>,
     /// ASCII; blanks if `None`.

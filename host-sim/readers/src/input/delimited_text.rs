@@ -102,7 +102,7 @@ impl Lines {
     /// The next non-blank line, trimmed, with its number from 1; Latin-1 unless UTF-8. `None` at the end.
     ///
     /// # Errors
-    /// The file cannot be read or decompressed, or the line, before the rows, is longer than 65536 bytes or has control
+    /// The file cannot be read or decompressed, or a line before the rows is longer than 65536 bytes, or has control
     /// characters.
     pub fn next_line(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {

@@ -37,7 +37,7 @@ struct Group {
     title: &'static str,
     prefix: &'static str,
     names: [&'static str; 3],
-    /// Of N, B and K, as [`conversions`] has them, and as they are printed.
+    /// The units of N, B and K, as [`conversions`] has them, and as they are printed.
     units: [&'static str; 3],
     symbols: [&'static str; 3],
     /// Factor from the one to the other.

@@ -1,4 +1,4 @@
-//! What the length of a record is good for: which coefficients are known, and how much longer it would have to be.
+//! The coefficients that a record of this length gives, and the length that the others need.
 
 use super::channels::inertial;
 use super::condition::report_length_s;
