@@ -24,7 +24,7 @@ exec "$@" -C passes=sancov-module -C llvm-args=-sanitizer-coverage-level=3 -C ll
 WRAPPER
 chmod +x "$TARGET/fuzz/rustc"
 RUSTC_WRAPPER='' RUSTC_WORKSPACE_WRAPPER=$TARGET/fuzz/rustc cargo build --locked --workspace --example fuzz --features \
-    fuzz/libfuzzer,adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt
+    fuzz/libfuzzer,adis16405-driver/async,adis16405-driver/serde,allan-core/serde
 cp "$TARGET/debug/examples/fuzz" "$TARGET/fuzz/fuzz"
 
 # libFuzzer writes only to its first folder, so the corpus is not changed. Each simulated device leaks 0.1 MB of static variables.

@@ -55,10 +55,10 @@ esac
 
 run() { printf '+ %s\n' "$*"; "$@"; }
 # All steps use these crates and features, so that no crate is built twice.
-FEATURES=(--locked --workspace --features
-    adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt)
+FEATURES=(--locked --workspace --features adis16405-driver/async,adis16405-driver/serde,allan-core/serde)
 # Clippy checks every crate of the workspace that is compiled, including the images that the tests build.
 export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/lint.sh CARGO_INCREMENTAL=0
+export PYO3_BUILD_EXTENSION_MODULE=1 # the Python module links no Python
 nextest() { run "$TARGET/python/bin/cargo-nextest" nextest run "${FEATURES[@]}" --show-progress none "$@"; }
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 debian() {
@@ -162,12 +162,19 @@ dependencies() {
             check licenses bans sources
     done
 }
-python() { # with the packages of tests/requirements.txt; one wheel, compiled as the tests are, so that dependencies are compiled once
-    local python=$TARGET/python/bin pip
+python() { # with the packages of tests/requirements.txt
+    local python=$TARGET/python/bin module=$TARGET/module pip
     pip=("$python/pip" --quiet --disable-pip-version-check)
-    rm -f "$TARGET"/wheels/*.whl
-    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET run "${pip[@]}" wheel --config-settings build-args="--profile dev" \
-        --no-build-isolation --no-deps --wheel-dir "$TARGET/wheels" ./host-sim/python
+    # The wheel holds the library as it is compiled with the tests, since maturin would compile all crates again. tests/release.sh makes
+    # those of a release.
+    run cargo build --quiet "${FEATURES[@]}" --lib --tests
+    rm -rf "$module" "$TARGET/wheels"
+    cp -r host-sim/python/package "$module"
+    find "$module" -name __pycache__ -prune -exec rm -r {} +
+    cp "$TARGET/debug/lib_native.so" "$module/imunoise/_native.abi3.so"
+    run "$python/maturin" pep517 write-dist-info --metadata-directory "$module" --interpreter "$python/python" \
+        --manifest-path host-sim/python/Cargo.toml
+    run "$python/wheel" pack --dest-dir "$(mkdir -p "$TARGET/wheels" && echo "$TARGET/wheels")" "$module"
     run "${pip[@]}" install --no-deps --force-reinstall "$TARGET"/wheels/imunoise-*.whl
     local marks=(-m "not cluster")
     if [ ${#chosen[@]} != 0 ]; then # --long

@@ -234,6 +234,7 @@ pub(crate) mod checkpoint;
 pub(crate) mod snapshot;
 
 mod block;
+mod small_powers;
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Size of an estimator in bytes.

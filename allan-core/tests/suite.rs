@@ -5,8 +5,6 @@ mod confidence;
 mod coupling;
 mod coverage;
 mod fit;
-#[cfg(all(feature = "defmt", feature = "host"))]
-mod formatted;
 mod gaps;
 #[cfg(feature = "host")]
 mod host;

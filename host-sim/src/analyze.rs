@@ -2,7 +2,7 @@
 
 use crate::cli::{AnalyzeArguments, InputArguments, OutputArguments, RecordingArguments, ReplayArguments};
 use crate::inspect::{self, read_or_ask};
-use crate::output::{self, Analysed, Incomplete, note, write_noise};
+use crate::output::{self, Analysed, Incomplete, note, notes_of_file, write_noise};
 use crate::output_files::OutputFiles;
 use crate::output_format::{OutputFile, OutputFormat};
 use crate::progress::{self, Progress};
@@ -21,7 +21,7 @@ use recordings::ReadOptions;
 use recordings::file_format::RecordedInput;
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, part_of};
-use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
+use recordings::{ColumnSelection, FileHash, Note, Printable, ReadMonitor, count_table};
 use reports::export::ExportFormat;
 use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         );
     }
     let names: Vec<String> = sensors.iter().map(sensor_name).collect();
-    let mut reading = SeveralReadings::of_sensors(&sensors);
+    let mut reading = SeveralReadings::default();
     let still: Vec<Measurement> = sensors.iter().map(|sensor| reading.read(sensor)).collect::<Result<_>>()?;
     match names.len() {
         0..=MOST_NAMED => note(format_args!("recordings: {}", Printable(&names.join(", ")))),
@@ -80,26 +80,17 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
 #[derive(Debug, Default)]
 pub(crate) struct SeveralReadings {
     incomplete: usize,
-    /// Columns that are read by one of them.
-    columns: Vec<String>,
     /// Notes that were printed.
-    told: Vec<String>,
+    told: Vec<Note>,
 }
 
 impl SeveralReadings {
-    /// Readings of the sensors of one file.
-    fn of_sensors(sensors: &[RecordingArguments]) -> Self {
-        let assignments = sensors.iter().flat_map(|sensor| &sensor.input.columns);
-        let columns = assignments.filter_map(|text| Some(text.split_once('=')?.1.to_owned())).collect();
-        Self { columns, ..Self::default() }
-    }
-
-    /// Reads all samples of a recording into memory. A note is printed once, and names no column that another one reads.
+    /// Reads all samples of a recording into memory. A note is printed once.
     pub(crate) fn read(&mut self, recording: &RecordingArguments) -> Result<Measurement> {
         let OpenStream { stream: read, notes, .. } = read_or_ask(recording, open_measured)?;
-        for note in notes.iter().filter_map(|note| note_without(note, &self.columns)) {
+        for note in notes {
             if !self.told.contains(&note) {
-                note_all(std::slice::from_ref(&note));
+                notes_of_file(std::slice::from_ref(&note));
                 self.told.push(note);
             }
         }
@@ -153,21 +144,21 @@ fn sensor_name(recording: &RecordingArguments) -> String {
 }
 
 /// Called after a recording was read and before it is analysed, with notes for the user.
-type EndReading<'a> = dyn FnMut(&SampleStream, &[String]) + 'a;
+type EndReading<'a> = dyn FnMut(&SampleStream, &[Note]) + 'a;
 
 /// The report of a recording, with a progress bar. If the reading is interrupted, the report is of the samples read
 /// until then.
 pub(crate) fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
-    let mut end_reading = |stream: &SampleStream, notes: &[String]| {
+    let mut end_reading = |stream: &SampleStream, notes: &[Note]| {
         if progress.end_reading() {
             note(format_args!(
                 "interrupted: this is the report of the first {} samples, which were read until then",
                 stream.description().samples
             ));
         }
-        note_all(notes);
+        notes_of_file(notes);
     };
     report(recording, is_quick, &monitor, &mut end_reading)
 }
@@ -198,7 +189,7 @@ fn report_of_samples(
     if is_quick {
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream, &notes);
-        let reading = reading_record(&stream, file(), recording.options(true), notes);
+        let reading = reading_record(&stream, file(), recording.options(true), &notes);
         let bar = progress::fitting(stream.description().channels.len());
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
@@ -207,7 +198,7 @@ fn report_of_samples(
     let mut reading = ReadingRecord::default();
     let report = analyze_stream(stream, &mut |stream| {
         end_reading(stream, &notes);
-        reading = reading_record(stream, file(), recording.options(false), notes.clone());
+        reading = reading_record(stream, file(), recording.options(false), &notes);
     })?;
     // The hash is computed while the samples are analysed.
     Ok(Analysed { report, reading: Some(ReadingRecord { sha256: finished(hash), ..reading }) })
@@ -223,30 +214,8 @@ fn analyze_stream(stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStrea
     Ok(progress::analysing(|watch| samples.analyze(watch)))
 }
 
-/// Most columns that a note names on the screen.
-const MOST_COLUMNS: usize = 8;
-/// Before the names in a note on many columns.
-const THEY_ARE: &str = ". They are ";
-const NOT_NAMED: &str = " left out: --columns does not name it";
-
-/// Prints notes, many names as a number.
-fn note_all(notes: &[String]) {
-    notes.iter().for_each(|sentence| match sentence.split_once(THEY_ARE) {
-        Some((sentence, _)) => note(format_args!("{sentence} (`inspect`, .json and .html have their names)")),
-        None => note(format_args!("{sentence}")),
-    });
-}
-
-/// A note without the columns that are `read` by another recording of the file; `None` if no column is left.
-fn note_without(note: &str, read: &[String]) -> Option<String> {
-    let (head, many) = note.split_once(THEY_ARE).map_or((note, None), |(head, names)| (head, Some(names)));
-    let Some(few) = head.strip_suffix(NOT_NAMED).filter(|_| !read.is_empty()) else { return Some(note.to_owned()) };
-    let names: Vec<&str> = many.unwrap_or(few).split(", ").filter(|name| !read.iter().any(|of| of == name)).collect();
-    match names.len() {
-        0 => None,
-        1..=MOST_COLUMNS => Some(format!("{}{NOT_NAMED}", names.join(", "))),
-        count => Some(format!("{count} columns{NOT_NAMED}{THEY_ARE}{}", names.join(", "))),
-    }
+fn note_damage(damage: Option<&str>) {
+    damage.into_iter().for_each(|damage| note(format_args!("{damage}")));
 }
 
 /// Opens a recording of any format, or the part of it that the arguments select.
@@ -259,7 +228,7 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
 /// Reads all samples of a recording into memory.
 fn open_measured(recording: &RecordingArguments) -> Result<OpenStream> {
     let opened = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
-    note_all(opened.stream.rows_read().damage.as_slice());
+    note_damage(opened.stream.rows_read().damage.as_deref());
     Ok(opened)
 }
 
@@ -275,8 +244,8 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<(Report, boo
         );
     }
     let (recording, notes) = replayed(&input, (*range).into())?;
-    note_all(&notes);
-    note_all(recording.damage.as_slice());
+    notes_of_file(&notes);
+    note_damage(recording.damage.as_deref());
     let is_complete = recording.damage.is_none();
     let report = analyze_recording(recording, *rate).with_context(|| file.display().to_string())?;
     Ok((report, is_complete))
@@ -285,15 +254,15 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<(Report, boo
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
 pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> Result<Report> {
     let stream = SampleStream::recorded(recording, Reading::new(rate_hz, KEPT))?;
-    analyze_stream(stream, &mut |stream| note_all(stream.notes()))
+    analyze_stream(stream, &mut |stream| notes_of_file(stream.notes()))
 }
 
 /// Opens a file of any format.
 fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<OpenRecording> {
-    let InputArguments { range, sensor, columns, units, topic, .. } = arguments;
+    let InputArguments { range, sensor, columns, units, topic, read_by_others, .. } = arguments;
     let range = (*range).into();
     let sensor = sensor.as_deref().map(|name| sensor_profile(name, range)).transpose()?;
-    let selection = ColumnSelection::parse(columns, units)?;
+    let selection = ColumnSelection::parse(columns, units)?.beside(read_by_others.clone());
     let input = arguments.open(monitor)?;
     OpenRecording::new(input, OpenOptions { sensor, selection, topic: topic.clone(), range })
 }
@@ -316,7 +285,7 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
             Recorded::Counts(recording.map_err(|error| named(error, &arguments.input.file))?)
         }
         OpenRecording::Replayed(recording, notes) => {
-            note_all(&notes);
+            notes_of_file(&notes);
             Recorded::Counts(match part {
                 Some(part) => {
                     part_of(recording, part, rate).map_err(|error| named(error.into(), &arguments.input.file))?
@@ -331,7 +300,7 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
 /// Reads the samples of a recording of any format on their time base, and prints notes for the user.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
     let OpenStream { stream, notes, .. } = open_measured(arguments)?;
-    note_all(&notes);
+    notes_of_file(&notes);
     Ok(stream.into_beginning())
 }
 

@@ -673,6 +673,9 @@ pub(crate) struct InputArguments {
     /// Example: --units deg/s/131,g/16384
     #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
     pub(crate) units: Vec<String>,
+    /// Columns that other sensors of the file read.
+    #[arg(skip)]
+    pub(crate) read_by_others: Vec<String>,
     /// Topic, message or array of a file with several
     ///
     /// One of the names that `imunoise inspect FILE` shows.
@@ -724,6 +727,7 @@ impl InputArguments {
             sensor: None,
             columns: Vec::new(),
             units: Vec::new(),
+            read_by_others: Vec::new(),
             topic: None,
             accept_guess: false,
             memory: None,

@@ -86,7 +86,14 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
         );
         return Err(Question { error, text: contents.to_string(), hint: "" }.into());
     }
-    Ok(proposals.into_iter().map(|proposal| contents.arguments(proposal)).collect())
+    let column = |assignment: &String| Some(assignment.split_once('=')?.1.to_owned());
+    let columns: Vec<String> = proposals.iter().flat_map(|proposal| &proposal.columns).filter_map(column).collect();
+    let of_sensor = |proposal| {
+        let mut arguments = contents.arguments(proposal);
+        arguments.input.read_by_others.clone_from(&columns);
+        arguments
+    };
+    Ok(proposals.into_iter().map(of_sensor).collect())
 }
 
 /// The longest part at rest of the file of `recording`, as `inspect` shows it; `None` if it shows none, or more than one table.
@@ -264,7 +271,7 @@ fn write_table(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resul
     if let [first, .., last] = constant.as_slice() {
         writeln!(f, "  {} columns never change, {} to {}", constant.len(), Printable(first), Printable(last))?;
     }
-    table.notes.iter().try_for_each(|note| writeln!(f, "note: {}", Printable(note)))
+    table.notes.iter().try_for_each(|note| writeln!(f, "note: {}", Printable(&note.to_string())))
 }
 
 fn write_steady(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Result {

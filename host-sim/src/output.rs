@@ -6,7 +6,7 @@ use crate::output_format::{OutputFile, OutputFormat};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
-use recordings::Printable;
+use recordings::{Note, Printable};
 use reports::export::{self, AxisChoice, ExportFormat};
 use reports::figure::{self, Picture};
 use reports::json::ReportJson;
@@ -218,6 +218,14 @@ pub(crate) fn progress_bar(length: u64, template: &str) -> ProgressBar {
     match ProgressStyle::with_template(template) {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
+    }
+}
+
+/// Prints notes on a file, the names of many columns as a number.
+pub(crate) fn notes_of_file(notes: &[Note]) {
+    for of in notes {
+        let names = if of.has_many_columns() { " (`inspect`, .json and .html have their names)" } else { "" };
+        note(format_args!("{}{names}", of.in_short()));
     }
 }
 

@@ -7,6 +7,7 @@ mod attack;
 #[path = "boards/main.rs"]
 mod boards;
 mod estimator;
+mod formatted;
 mod links;
 mod recorded_words;
 mod recordings;

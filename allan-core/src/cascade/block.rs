@@ -1,5 +1,6 @@
 //! Slices of samples: the same differences as sample by sample, computed level by level in loops that vectorise.
 
+use super::small_powers::{SMALL, small_powers};
 use super::{Cascade, second_difference};
 use crate::moments::{rounded, unit_bits};
 
@@ -224,7 +225,7 @@ impl Word for i32 {
         if bits > 0 {
             return wide_powers(sums, bits);
         }
-        if !*is_large && let Some(powers) = narrow_powers(sums) {
+        if !*is_large && let Some(powers) = small_powers(sums) {
             return Some(powers);
         }
         let powers = middle_powers(sums);
@@ -233,60 +234,8 @@ impl Word for i32 {
     }
 }
 
-/// Differences that are squared together, so that vector units work on whole registers.
-const LANES: usize = 16;
-/// Differences below this have 13 bits at most.
-const SMALL: u32 = 1 << 13;
 /// Bits of a difference, and of a half of its square, in [`middle_powers`].
 const HALF: u32 = 26;
-
-/// Sums of the powers of differences below [`SMALL`]: the fourth powers of a block fill 62 bits. `None` if a difference
-/// has 14 bits or more.
-fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
-    let [(newest, last_newest), (middle, last_middle), (oldest, last_oldest)] = sums.map(<[i32]>::as_chunks);
-    let (mut digits, mut squares, mut fourths) = (0, 0_u64, 0_u64);
-    let mut add = |sums: [&[i32; LANES]; 3]| {
-        let lanes = lane_powers(sums);
-        digits |= lanes.digits;
-        squares += lanes.squares;
-        fourths = fourths.wrapping_add(lanes.fourths);
-    };
-    for ((newest, middle), oldest) in newest.iter().zip(middle).zip(oldest) {
-        add([newest, middle, oldest]);
-    }
-    let filled_with_zeros = |sums: &[i32]| {
-        let mut lanes = [0; LANES];
-        lanes[..sums.len()].copy_from_slice(sums);
-        lanes
-    };
-    add([last_newest, last_middle, last_oldest].map(filled_with_zeros).each_ref());
-    (digits < SMALL).then_some((squares.into(), fourths.into()))
-}
-
-/// Sums of the powers of some differences, valid only if all of them are below [`SMALL`].
-struct LanePowers {
-    /// Bitwise or of the magnitudes, valid for any differences.
-    digits: u32,
-    squares: u64,
-    fourths: u64,
-}
-
-#[inline(always)] // a call would keep the sums in memory
-fn lane_powers([newest, middle, oldest]: [&[i32; LANES]; 3]) -> LanePowers {
-    let mut powers = LanePowers { digits: 0, squares: 0, fourths: 0 };
-    let mut squares = [0; LANES];
-    for lane in 0..LANES {
-        let magnitude = (newest[lane] - middle[lane] - (middle[lane] - oldest[lane])).unsigned_abs();
-        powers.digits |= magnitude;
-        let small = magnitude & 0x7fff;
-        squares[lane] = small * small;
-    }
-    for square in squares.map(u64::from) {
-        powers.squares += square;
-        powers.fourths = powers.fourths.wrapping_add(square * square);
-    }
-    powers
-}
 
 /// The sums, and the bits of the differences; `None` if one has 27 bits or more.
 fn middle_powers(sums: [&[i32]; 3]) -> Option<((u128, u128), u32)> {

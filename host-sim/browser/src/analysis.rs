@@ -61,7 +61,7 @@ impl Recorded<'_> {
         let name = Printable(self.name).to_string();
         let mut reading = ReadingRecord::default();
         let samples = ReadSamples::read(stream, |stream| {
-            reading = reading_record(stream, name.clone(), self.options.words(), notes);
+            reading = reading_record(stream, name.clone(), self.options.words(), &notes);
         })?;
         let mut report = samples.analyze(&watch);
         reading.sha256 = hash.and_then(|hash| hash.finish().ok());

@@ -78,7 +78,7 @@ fn columns(table: &InspectedTable) -> Markup {
         }
         @if shown.len() > MOST_COLUMNS { p.faint { "… and " (shown.len() - MOST_COLUMNS) " columns more" } }
         @if shown.len() < columns.len() { p.faint { (columns.len() - shown.len()) " columns never change" } }
-        @for note in &table.notes { p.faint { (note) "." } }
+        @for note in &table.notes { p.faint { (note.to_string()) "." } }
     }
 }
 

@@ -24,7 +24,7 @@ const APART: usize = 16;
 const STRETCH: usize = 64;
 
 /// Declares the dtypes that are read without a copy. Floats have their automatic step over that of [`Quantizer::for_samples`]; integers have
-/// none. Each has the bits of a sample that do not fit a count; they are 0 if the sample is a count.
+/// none. Each has a number whose upper 32 bits are 0 if the sample is a count.
 macro_rules! dtypes {
     ($($name:ident $type:ty, $step:expr, |$value:ident| $beyond:expr;)*) => {
         /// An array of samples that Python holds.
@@ -93,13 +93,13 @@ dtypes! {
     Int8 i8, None, |_value| 0;
     Int16 i16, None, |_value| 0;
     Int32 i32, None, |_value| 0;
-    Int64 i64, None, |value| (value.wrapping_add(1 << 31) as u64) >> 32;
+    Int64 i64, None, |value| value.wrapping_add(1 << 31) as u64;
     UInt8 u8, None, |_value| 0;
     UInt16 u16, None, |_value| 0;
-    UInt32 u32, None, |value| u64::from(value >> 31);
-    UInt64 u64, None, |value| value >> 31;
-    Float32 f32, Some(SINGLE_PRECISION), |_value| 1;
-    Float64 f64, Some(1.0), |_value| 1;
+    UInt32 u32, None, |value| u64::from(value) << 1;
+    UInt64 u64, None, |value| value | value << 1;
+    Float32 f32, Some(SINGLE_PRECISION), |_value| u64::MAX;
+    Float64 f64, Some(1.0), |_value| u64::MAX;
 }
 
 /// Counts of the first samples of a part of an array.
@@ -127,7 +127,7 @@ impl Counts {
         Ok(Self { counts: [0; BLOCK], quantizer: grid.map(quantizer).transpose()?, first })
     }
 
-    /// [`each_run`](Self::each_run) for samples of one type. Without a grid, samples whose bits `beyond` a count are 0 are counts.
+    /// [`each_run`](Self::each_run) for samples of one type. Without a grid, a sample is a count if the upper 32 bits of `beyond` are 0.
     fn each_block<T: Sample>(
         &mut self,
         values: ArrayView1<T>,
@@ -216,14 +216,14 @@ samples! {
     u64: |quantizer: &Quantizer, values: &[u64], counts| put_each(quantizer, values, counts);
 }
 
-/// Puts integers into `counts` up to the first one with bits `beyond` those of a count; returns their number.
+/// Puts integers into `counts` up to the first one that is no count; returns their number.
 fn put_integers<T: Sample>(values: &[T], counts: &mut [i32], beyond: impl Fn(T) -> u64) -> usize {
     let mut found = 0;
     for (count, &value) in counts.iter_mut().zip(values) {
         *count = value.low_bits();
         found |= beyond(value);
     }
-    if found == 0 { values.len() } else { values.iter().take_while(|&&value| beyond(value) == 0).count() }
+    if found >> 32 == 0 { values.len() } else { values.iter().take_while(|&&value| beyond(value) >> 32 == 0).count() }
 }
 
 /// Puts the counts of samples on a grid into `counts` one by one; returns the number of samples that have one.

@@ -5,7 +5,7 @@ mod sensor_guess;
 mod steady_part;
 mod unit_guess;
 
-use crate::columns::{ColumnSelection, SensorChannels};
+use crate::columns::{ColumnSelection, Note, SensorChannels};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::rows::{BATCH, Batch, PaddingFinder, WholeTable};
@@ -75,7 +75,7 @@ pub struct InspectedTable {
     /// If times, index or rate tell it.
     pub steady_s: Option<TimeRange>,
     pub proposals: Vec<Proposal>,
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 impl InspectedTable {
@@ -105,7 +105,7 @@ impl InspectedTable {
             notes: table.notes.clone(),
         };
         if let Some(back) = times.as_ref().map(|times| times.backwards).filter(|back| *back > 0) {
-            inspected.notes.push(format!("{back} rows whose time goes back"));
+            inspected.notes.push(format!("{back} rows whose time goes back").into());
         }
         let times_s = times.as_ref().map(|times| times.seconds.as_slice());
         // An index has to fit the times.
@@ -117,7 +117,7 @@ impl InspectedTable {
             inspected.rate = placed.stamps.as_ref().and_then(|stamps| stamps.rate);
             inspected.missing = placed.missing;
             inspected.gaps = placed.gaps;
-            inspected.notes.extend(placed.stamps.iter().flat_map(StampQuality::notes));
+            inspected.notes.extend(placed.stamps.iter().flat_map(StampQuality::notes).map(Note::from));
         }
         if let Some(SteadyPart { rows, .. }) = &mut inspected.steady {
             let rate_hz = inspected.rate.map(|rate| rate.hz).or(table.rate_hz);
@@ -175,7 +175,7 @@ fn without_padding(mut table: WholeTable) -> (WholeTable, usize) {
         column.values.truncate(unpadded.end as usize);
         column.values.drain(..before);
     }
-    table.notes.push(unpadded.note(finder.rows()));
+    table.notes.push(unpadded.note(finder.rows()).into());
     (table, before)
 }
 

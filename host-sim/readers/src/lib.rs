@@ -7,8 +7,8 @@ pub mod inspection;
 mod rows;
 
 pub use columns::{
-    ACCELEROMETER, ColumnSelection, GYROSCOPE, MAGNETOMETER, Printable, RowOptions, SelectionError, SensorChannel,
-    SensorChannels, is_output_register,
+    ACCELEROMETER, ColumnSelection, GYROSCOPE, MAGNETOMETER, Note, Printable, RowOptions, SelectionError,
+    SensorChannel, SensorChannels, is_output_register,
 };
 pub use formats::file_format::{FileFormat, HEAD_BYTES, InputFile, TopicDescription, files_of_bag};
 pub use formats::memory_table::{MemoryArray, MemoryColumn, MemoryTable};

@@ -134,7 +134,7 @@ fn streamed(times: &[f64]) -> (f64, u64, Vec<String>) {
     let stream = SampleStream::counts(input, GyroRange::Dps300, reading).expect("a time base");
     assert!(!stream.is_in_memory(), "{:?}", stream.notes());
     let description = stream.description();
-    (description.sample_rate_hz, description.dropped["gap"], stream.notes().to_vec())
+    (description.sample_rate_hz, description.dropped["gap"], stream.notes().iter().map(ToString::to_string).collect())
 }
 
 /// Stamps in whole µs of samples that are read up to 0.2 ms late; `period_s` says how long after each row the next one is taken.
@@ -232,7 +232,7 @@ fn read_stamps(heading: &str, stamps: &[String]) -> (usize, f64, u64, Vec<String
     let reading = Reading::new(None, KeptInMemory::ALL);
     let stream = SampleStream::any_sensor(RecordedInput::open(&file).expect("a table"), options, reading);
     let stream = stream.unwrap_or_else(|error| panic!("{heading}: {error}"));
-    let notes = stream.notes().to_vec();
+    let notes = stream.notes().iter().map(ToString::to_string).collect();
     let samples = stream.into_beginning();
     (samples.len(), samples.sample_rate_hz, samples.dropped["gap"], notes)
 }

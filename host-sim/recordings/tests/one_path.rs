@@ -57,7 +57,12 @@ fn read(file: &Path, units: &[&str], reading: Reading) -> Result {
         slots.extend(block.slots);
     }
     channels.iter_mut().for_each(|channel| channel.refused.sort_unstable());
-    Result { description: stream.description().clone(), slots, channels, notes: stream.notes().to_vec() }
+    Result {
+        description: stream.description().clone(),
+        slots,
+        channels,
+        notes: stream.notes().iter().map(ToString::to_string).collect(),
+    }
 }
 
 fn held(measurement: &Measurement, notes: &[String]) -> Result {
@@ -177,7 +182,7 @@ fn any_size_of_batches_gives_the_same_samples_notes_and_counts() {
         }
         let stream = open(&file, &[], Reading::new(None, KeptInMemory::ALL));
         assert!(stream.is_in_memory());
-        let notes = stream.notes().to_vec();
+        let notes = stream.notes().iter().map(ToString::to_string).collect::<Vec<_>>();
         assert_eq!(held(&stream.into_beginning(), &notes), whole, "{table:?}");
     }
 }

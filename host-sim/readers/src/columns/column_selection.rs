@@ -1,6 +1,7 @@
 //! The columns of channels, time and index with their units, as the user says or by their names.
 
 use crate::columns;
+use crate::columns::note::Note;
 use crate::columns::{COUNT, INERTIAL, Printable, SECOND, SensorChannel, SensorChannels, Unit};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,6 +71,8 @@ pub struct ColumnSelection {
     assignments: Vec<(String, String)>,
     units: Vec<Unit>,
     has_no_time: bool,
+    /// Columns that no note needs to name.
+    read_by_others: Vec<String>,
 }
 
 impl ColumnSelection {
@@ -97,13 +100,19 @@ impl ColumnSelection {
             }
             known.push(unit);
         }
-        Ok(Self { assignments, units: known, has_no_time: false })
+        Ok(Self { assignments, units: known, ..Self::default() })
     }
 
     /// The same, without a column of times.
     #[must_use]
     pub fn without_time(self) -> Self {
         Self { has_no_time: true, ..self }
+    }
+
+    /// The same, of one of several sensors: `columns` are read by the others, and are not noted as left out.
+    #[must_use]
+    pub fn beside(self, columns: Vec<String>) -> Self {
+        Self { read_by_others: columns, ..self }
     }
 
     /// True if nothing is stated.
@@ -188,24 +197,20 @@ impl ColumnSelection {
         chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
     }
 
-    /// Sentences on the columns that are not `chosen`, and on units by name.
+    /// Notes on the columns that are not `chosen`, and on units by name.
     pub(crate) fn notes(
         &self,
         available: &[AvailableColumn],
         chosen: &[ChosenColumn],
         sensor: &SensorChannels,
-    ) -> Vec<String> {
-        let mut notes = Vec::new();
-        let mut add = |names: &[&str], what: &str| {
-            notes.extend((!names.is_empty()).then(|| note_on(names, what)));
-        };
+    ) -> Vec<Note> {
         // Positions may be those of a whole row.
         let is_used = |at: &usize| chosen.iter().any(|column| column.label == available[*at].name);
         if !self.assignments.is_empty() {
-            let others = available.iter().enumerate().filter(|(at, _)| !is_used(at));
-            let others: Vec<&str> = others.map(|(_, column)| column.name.as_str()).collect();
-            add(&others, "left out: --columns does not name it");
-            return notes;
+            let is_other = |name: &&String| !self.read_by_others.contains(name);
+            let others = available.iter().enumerate().filter(|(at, _)| !is_used(at)).map(|(_, column)| &column.name);
+            let others = others.filter(is_other).cloned().collect();
+            return Note::on_columns(others, "left out: --columns does not name it").into_iter().collect();
         }
         let named = by_name(available, sensor).unwrap_or_default();
         let unitless = self.unitless_companions(&named, available);
@@ -215,27 +220,29 @@ impl ColumnSelection {
         for (_, column) in available.iter().enumerate().filter(|(at, _)| is_left_out(at)) {
             match (sensor.channel(&column.name).or_else(|| column.channel(sensor)), column.unit) {
                 (Some(_), Some(unit)) => other_unit.push(format!("{} in {}", column.name, unit.name)),
-                _ => no_channel.push(column.name.as_str()),
+                _ => no_channel.push(column.name.clone()),
             }
         }
         let has_no_name = |column: &&ChosenColumn| {
             let position = available.iter().position(|of| of.name == column.label);
             position.is_some_and(|position| role_by_name(available, position, sensor).is_none())
         };
-        let labels = |is_one: &dyn Fn(&&ChosenColumn) -> bool| -> Vec<&str> {
-            chosen.iter().filter(is_one).map(|column| column.label.as_str()).collect()
+        let labels = |is_one: &dyn Fn(&&ChosenColumn) -> bool| -> Vec<String> {
+            chosen.iter().filter(is_one).map(|column| column.label.clone()).collect()
         };
-        let unitless: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
-        let other_unit: Vec<&str> = other_unit.iter().map(String::as_str).collect();
-        add(&unitless, "left out: no unit; --units gives one");
-        add(&other_unit, "left out: a unit of another quantity than the name; --columns reads it");
-        add(&no_channel, "left out: no known name of a channel; --columns reads it");
-        add(&labels(&has_no_name), "are axes of a sensor by their unit; --columns says otherwise");
-        add(
-            &labels(&|column| self.unit_of_interface(column).is_some()),
-            "taken to be in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise",
-        );
-        notes
+        let unitless = unitless.iter().map(|&at| available[at].name.clone()).collect();
+        let by_interface = labels(&|column| self.unit_of_interface(column).is_some());
+        let notes = [
+            (unitless, "left out: no unit; --units gives one"),
+            (other_unit, "left out: a unit of another quantity than the name; --columns reads it"),
+            (no_channel, "left out: no known name of a channel; --columns reads it"),
+            (labels(&has_no_name), "are axes of a sensor by their unit; --columns says otherwise"),
+            (
+                by_interface,
+                "taken to be in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise",
+            ),
+        ];
+        notes.into_iter().filter_map(|(columns, statement)| Note::on_columns(columns, statement)).collect()
     }
 
     fn unit_of_interface(&self, column: &ChosenColumn) -> Option<Unit> {
@@ -410,33 +417,22 @@ fn names(available: &[AvailableColumn]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
-/// Most names at the beginning of a note; more stand at its end.
-const FEW: usize = 8;
-
-/// `a, b left out: no unit`, or of many columns `60 columns left out: no unit. They are a, b, …`, which a screen may cut.
-fn note_on(names: &[&str], text: &str) -> String {
-    match names.len() {
-        0..=FEW => format!("{} {text}", listed(names)),
-        many => format!("{many} columns {text}. They are {}", listed(names)),
-    }
-}
-
 /// `a[0…8]` are nine elements of an array.
-fn listed(names: &[&str]) -> String {
+pub(super) fn listed(names: &[String]) -> String {
     let element = |name: &str| {
         let (array, number) = name.strip_suffix(']')?.rsplit_once('[')?;
         Some((array.to_owned(), number.parse::<usize>().ok()?))
     };
     let mut all: Vec<String> = Vec::new();
     let mut rest = names;
-    while let Some((&first, after)) = rest.split_first() {
-        let follows = |(at, name): &(usize, &&str)| {
+    while let Some((first, after)) = rest.split_first() {
+        let follows = |(at, name): &(usize, &String)| {
             element(first).is_some_and(|(array, start)| element(name) == Some((array, start + at)))
         };
         let elements = rest.iter().enumerate().take_while(follows).count();
         match element(first).filter(|_| elements > 1) {
             Some((array, start)) => all.push(format!("{array}[{start}…{}]", start + elements - 1)),
-            None => all.push(first.to_owned()),
+            None => all.push(first.clone()),
         }
         rest = if elements > 1 { &rest[elements..] } else { after };
     }
@@ -617,7 +613,11 @@ fn role_of(name: &str) -> Option<NamedRole> {
 #[cfg(test)]
 mod tests {
     use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
-    use crate::columns::SensorChannels;
+    use crate::columns::{Note, SensorChannels};
+
+    fn sentences(notes: &[Note]) -> Vec<String> {
+        notes.iter().map(ToString::to_string).collect()
+    }
 
     fn chosen(headings: &[&str], columns: &[&str], units: &[&str]) -> Result<Vec<(String, f64)>, SelectionError> {
         let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
@@ -646,7 +646,12 @@ mod tests {
             let selection = ColumnSelection::parse(&columns, &[]).expect("columns");
             let sensor = SensorChannels::generic();
             let chosen = selection.choose(&available, &sensor).expect("columns");
-            assert_eq!(selection.notes(&available, &chosen, &sensor), [expected]);
+            assert_eq!(sentences(&selection.notes(&available, &chosen, &sensor)), [expected]);
+            let others = ["gy", "gz", "cov[0]", "cov[1]", "cov[4]"].map(str::to_owned).to_vec();
+            let notes = sentences(&selection.beside(others).notes(&available, &chosen, &sensor));
+            let remains =
+                if columns.is_empty() { expected } else { "cov[2], state left out: --columns does not name it" };
+            assert_eq!(notes, [remains]);
         }
     }
 
@@ -740,7 +745,7 @@ mod tests {
         let (selection, sensor) = (ColumnSelection::default(), SensorChannels::generic());
         let chosen = selection.choose(&available, &sensor).expect("columns");
         let expected = "ω_x, ω_y, ω_z, fX, fY, fZ are axes of a sensor by their unit; --columns says otherwise";
-        assert_eq!(selection.notes(&available, &chosen, &sensor), [expected]);
+        assert_eq!(sentences(&selection.notes(&available, &chosen, &sensor)), [expected]);
     }
 
     #[test]
@@ -752,7 +757,7 @@ mod tests {
         let chosen = selection.choose(&available, &sensor).expect("columns");
         let notes = selection.notes(&available, &chosen, &sensor);
         assert_eq!(
-            notes,
+            sentences(&notes),
             [
                 "temp left out: no unit; --units gives one",
                 "m_x in V left out: a unit of another quantity than the name; --columns reads it",

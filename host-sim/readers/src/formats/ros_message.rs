@@ -1,6 +1,6 @@
 //! Rows of ROS messages: inertial columns and times.
 
-use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Note};
 use crate::formats::message_layout::{Encoding, MessageColumn, MessageLayout};
 use crate::formats::topics::Topic;
 use crate::rows::{Number, TopicSensor};
@@ -141,8 +141,8 @@ impl<'a> RosRows<'a> {
         row
     }
 
-    pub(crate) fn notes(&self) -> Vec<String> {
+    pub(crate) fn notes(&self) -> Vec<Note> {
         let unset = "the stamps of the messages are not set; the times at which they were recorded stand for them";
-        self.is_unset.filter(|unset| *unset).map(|_| unset.to_owned()).into_iter().collect()
+        self.is_unset.filter(|unset| *unset).map(|_| unset.to_owned().into()).into_iter().collect()
     }
 }

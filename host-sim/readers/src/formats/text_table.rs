@@ -1,6 +1,6 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
-use crate::columns::{AvailableColumn, COUNT, ChosenColumn, Role, RowOptions, SelectionError, Unit, as_they_are};
+use crate::columns::{AvailableColumn, COUNT, ChosenColumn, Note, Role, RowOptions, SelectionError, Unit, as_they_are};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
 use crate::formats::fields::{leading_number, number, split, with_unit};
 use crate::formats::nmea::{self, Sentence};
@@ -108,7 +108,7 @@ pub(crate) struct TextTable {
     layout: Layout,
     /// Stated before the rows, Hz.
     rate_hz: Option<f64>,
-    columns_notes: Vec<String>,
+    columns_notes: Vec<Note>,
     damaged: DamagedRows,
     is_lenient: bool,
     /// Rows begin with a letter.
@@ -346,7 +346,7 @@ impl RowSource for TextTable {
 }
 
 impl TextTable {
-    fn notes(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<Note> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let zeros = self.lines.zero_bytes();
         let mut counted = vec![(zeros, format!("{zeros} bytes that are zero are left out"))];
@@ -365,7 +365,8 @@ impl TextTable {
         };
         counted.push((*others, format!("{others} {what}")));
         let counted = counted.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text);
-        self.columns_notes.iter().cloned().chain(of_rate).chain(self.damaged.notes()).chain(counted).collect()
+        let of_rows = of_rate.into_iter().chain(self.damaged.notes()).chain(counted).map(Note::from);
+        self.columns_notes.iter().cloned().chain(of_rows).collect()
     }
 
     fn fault(&self, line: u64, RowFault { column, reason }: RowFault) -> InputError {

@@ -1,6 +1,8 @@
 //! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
-use crate::columns::{AvailableColumn, ChosenColumn, ColumnSelection, RowOptions, SensorChannels, Unit, as_they_are};
+use crate::columns::{
+    AvailableColumn, ChosenColumn, ColumnSelection, Note, RowOptions, SensorChannels, Unit, as_they_are,
+};
 use crate::input::{Budget, InputError, Reason};
 use crate::rows::{self, Ending, Number, Refusal, RowSource, TopicSensor, WholeTable};
 use std::path::Path;
@@ -242,7 +244,7 @@ pub(crate) struct TopicRows<'a> {
     source: Box<dyn Source + 'a>,
     topic: usize,
     chosen: Vec<ChosenColumn>,
-    notes: Vec<String>,
+    notes: Vec<Note>,
     limits: FileLimits,
 }
 
@@ -281,16 +283,18 @@ impl<'a> TopicRows<'a> {
         }
         let sensor = choice.sensor.map(|at| &topic.sensors[at]);
         let chosen = choose_columns(topic, sensor, options).map_err(fail)?;
-        let mut notes: Vec<String> = Vec::new();
+        let mut notes: Vec<Note> = Vec::new();
         let states_units = |selection: &ColumnSelection| selection.has_units();
-        notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
+        notes.extend(
+            sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)).map(Note::from),
+        );
         notes.extend(options.selection.notes(&topic.columns, &chosen, &options.sensor));
         let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
         if options.topic.is_none() && source.offer().preferred.as_deref() == Some(name.as_str()) {
             let all = sensors(source.topics());
             let others: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).filter(|other| *other != name).collect();
             if !others.is_empty() {
-                notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
+                notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")).into());
             }
         }
         Ok(Self { file, source, topic: choice.topic, chosen, notes, limits })

@@ -4,6 +4,7 @@ use crate::batch_source::for_each_batch;
 use crate::counts::count_table_writer::write_text;
 use crate::counts::numpy_matrix::{MatrixWriter, SiUnit};
 use crate::file_format::{ReadOptions, RecordedInput};
+use readers::Note;
 use readers::{Batch, RowsRead, StreamError, ValueColumn, WantedRows};
 use std::fmt::Write as _;
 use std::io;
@@ -34,7 +35,7 @@ pub enum WriteError {
 pub struct WrittenRows {
     pub columns: Vec<String>,
     /// Remarks for the user, one sentence each.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     pub is_complete: bool,
 }
 
@@ -128,6 +129,10 @@ impl SensorRows<'_> {
         let read = read?;
         let is_complete = read.is_complete();
         let RowsRead { damage, notes, .. } = read;
-        Ok(WrittenRows { columns: names, notes: notes.into_iter().chain(damage).collect(), is_complete })
+        Ok(WrittenRows {
+            columns: names,
+            notes: notes.into_iter().chain(damage.map(Note::from)).collect(),
+            is_complete,
+        })
     }
 }

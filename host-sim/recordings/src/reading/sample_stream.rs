@@ -10,6 +10,7 @@ use measurement::{
     ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, SensorProfile, adis16405,
     lost_part,
 };
+use readers::Note;
 use readers::{
     ACCELEROMETER, BATCH, ColumnQuantizer, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, ReadMonitor, ReadPass,
     RowBefore, Unpadded, WantedRows,
@@ -99,7 +100,7 @@ pub struct SampleStream {
 struct SurveyedSamples {
     beginning: Measurement,
     description: RecordingDescription,
-    notes: Vec<String>,
+    notes: Vec<Note>,
     /// `beginning` is all.
     is_in_memory: bool,
 }
@@ -170,7 +171,7 @@ impl SampleStream {
                 options.selection = std::mem::take(&mut options.selection).without_time();
                 let pass = SurveyPass { origin: &origin, reading, most_rows: u64::MAX, monitor };
                 let Ok(mut survey) = pass.survey() else { return Err(error) };
-                survey.read.notes.push(format!("the time stamps are ignored: {error}"));
+                survey.read.notes.push(format!("the time stamps are ignored: {error}").into());
                 Ok(survey)
             }
             _ => Err(error),
@@ -199,7 +200,7 @@ impl SampleStream {
 
     /// Remarks for the user, one sentence each.
     #[must_use]
-    pub fn notes(&self) -> &[String] {
+    pub fn notes(&self) -> &[Note] {
         &self.samples.notes
     }
 
@@ -463,7 +464,7 @@ impl SurveyPass<'_> {
         let Some(unpadded) = padding.finish() else { return survey };
         let mut survey = self.unpadded(unpadded, &mut PaddingFinder::default())?;
         survey.read.padding = unpadded.first + padding.rows() - unpadded.end;
-        survey.read.notes.push(unpadded.note(padding.rows()));
+        survey.read.notes.push(unpadded.note(padding.rows()).into());
         Ok(survey)
     }
 
@@ -586,23 +587,21 @@ impl Survey {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        let mut notes = self.read.notes.clone();
-        notes.extend(self.full_scale_notes.iter().cloned());
-        for StreamedColumn { column, survey, .. } in self.columns.iter().filter(|of| of.quantizer.is_none()) {
+    fn notes(&self) -> Vec<Note> {
+        let unfilled = self.columns.iter().filter(|of| of.quantizer.is_none());
+        let unfilled = unfilled.map(|StreamedColumn { column, survey, .. }| {
             let what = if survey.is_zero() {
                 "is never filled: it is zero in every row, as its other axes are"
             } else {
                 "has no usable value"
             };
-            notes.push(format!("{} ({}) {what}, and is left out", column.channel.name, column.label));
-        }
-        notes.extend(self.missing_notes());
+            format!("{} ({}) {what}, and is left out", column.channel.name, column.label)
+        });
         let rounded = self.columns.iter().filter_map(|of| Some((&of.column.channel, of.quantizer.as_ref()?)));
-        notes.extend(rounding_note(rounded));
-        notes.extend(self.stamps.iter().flat_map(StampQuality::notes));
-        notes.extend(self.clock.note().map(str::to_owned));
-        notes
+        let of_samples = self.full_scale_notes.iter().cloned().chain(unfilled).chain(self.missing_notes());
+        let of_samples = of_samples.chain(rounding_note(rounded));
+        let of_times = self.stamps.iter().flat_map(StampQuality::notes).chain(self.clock.note().map(str::to_owned));
+        self.read.notes.iter().cloned().chain(of_samples.chain(of_times).map(Note::from)).collect()
     }
 
     /// Channels with equal counts share a note.

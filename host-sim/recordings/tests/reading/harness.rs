@@ -155,7 +155,7 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
     };
     assert!(stream.is_in_memory(), "{}: more rows than these tests read", file.display());
     let damage = stream.rows_read().damage.clone();
-    let notes = stream.notes().iter().cloned().chain(damage.clone()).collect();
+    let notes = stream.notes().iter().map(ToString::to_string).chain(damage.clone()).collect();
     Ok(Reading { samples: stream.into_beginning(), damage, notes })
 }
 
