@@ -21,7 +21,7 @@ use recordings::ReadOptions;
 use recordings::file_format::RecordedInput;
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, part_of};
-use recordings::{ColumnSelection, FileHash, Note, Printable, ReadMonitor, count_table};
+use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, ReadingNote, count_table};
 use reports::export::ExportFormat;
 use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
 pub(crate) struct SeveralReadings {
     incomplete: usize,
     /// Notes that were printed.
-    told: Vec<Note>,
+    told: Vec<ReadingNote>,
 }
 
 impl SeveralReadings {
@@ -144,14 +144,14 @@ fn sensor_name(recording: &RecordingArguments) -> String {
 }
 
 /// Called after a recording was read and before it is analysed, with notes for the user.
-type EndReading<'a> = dyn FnMut(&SampleStream, &[Note]) + 'a;
+type EndReading<'a> = dyn FnMut(&SampleStream, &[ReadingNote]) + 'a;
 
 /// The report of a recording, with a progress bar. If the reading is interrupted, the report is of the samples read
 /// until then.
 pub(crate) fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
-    let mut end_reading = |stream: &SampleStream, notes: &[Note]| {
+    let mut end_reading = |stream: &SampleStream, notes: &[ReadingNote]| {
         if progress.end_reading() {
             note(format_args!(
                 "interrupted: this is the report of the first {} samples, which were read until then",

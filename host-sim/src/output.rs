@@ -6,7 +6,7 @@ use crate::output_format::{OutputFile, OutputFormat};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
-use recordings::{Note, Printable};
+use recordings::{Printable, ReadingNote};
 use reports::export::{self, AxisChoice, ExportFormat};
 use reports::figure::{self, Picture};
 use reports::json::ReportJson;
@@ -222,7 +222,7 @@ pub(crate) fn progress_bar(length: u64, template: &str) -> ProgressBar {
 }
 
 /// Prints notes on a file, the names of many columns as a number.
-pub(crate) fn notes_of_file(notes: &[Note]) {
+pub(crate) fn notes_of_file(notes: &[ReadingNote]) {
     for of in notes {
         let names = if of.has_many_columns() { " (`inspect`, .json and .html have their names)" } else { "" };
         note(format_args!("{}{names}", of.in_short()));

@@ -24,7 +24,7 @@ const WORKER: &str = include_str!("../page/worker.js");
 const TARGET: &str = "wasm32-unknown-unknown";
 /// Profiles of cargo: one for users of the page, and one for fast builds.
 const PROFILE: &str = "browser";
-const QUICK_PROFILE: &str = "quick";
+const QUICK_PROFILE: &str = "quick-browser";
 /// Names of the program and of the image of the Pico beside the page. The program is compressed, since some servers do
 /// not compress it.
 const PROGRAM: &str = "observatory.wasm.gz";

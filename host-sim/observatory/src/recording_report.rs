@@ -9,7 +9,7 @@ use noise_analysis::effects::Effect;
 use noise_analysis::record::condensed_record::CondensedRecord;
 use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
 use noise_analysis::report::{Report, Stretch};
-use recordings::Note;
+use recordings::ReadingNote;
 use recordings::file_format::{FileFormat, RecordedFormat, RecordedInput};
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError};
@@ -33,7 +33,7 @@ pub enum OpenRecording {
     /// Numbers of any sensor.
     AnySensor(RecordedInput, Box<ReadOptions>),
     /// A log of the bus of an ADIS16405, already read, with notes about it.
-    Replayed(Recording, Vec<Note>),
+    Replayed(Recording, Vec<ReadingNote>),
 }
 
 /// Options for opening a recording of any format.
@@ -56,7 +56,7 @@ pub struct OpenStream {
     /// Hash of the file; a log of the bus has none.
     pub hash: Option<FileHash>,
     /// Notes about the file.
-    pub notes: Vec<Note>,
+    pub notes: Vec<ReadingNote>,
 }
 
 impl OpenRecording {
@@ -112,9 +112,9 @@ impl OpenRecording {
 ///
 /// # Errors
 /// Those of [`simulation::replay`].
-pub fn replayed(input: &RecordedInput, range: GyroRange) -> Result<(Recording, Vec<Note>), InputError> {
+pub fn replayed(input: &RecordedInput, range: GyroRange) -> Result<(Recording, Vec<ReadingNote>), InputError> {
     let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range)?;
-    let mut notes: Vec<Note> = timing.notes().into_iter().map(Note::from).collect();
+    let mut notes: Vec<ReadingNote> = timing.notes().into_iter().map(ReadingNote::from).collect();
     if other_transactions > 0 {
         notes.push(format!("{other_transactions} transactions that are no bursts").into());
     }
@@ -168,7 +168,12 @@ impl ReadSamples {
 /// The record of the reading of `file`, without a hash. `options` are the words of the command line, `notes` sentences
 /// for the user.
 #[must_use]
-pub fn reading_record(stream: &SampleStream, file: String, options: Vec<String>, notes: &[Note]) -> ReadingRecord {
+pub fn reading_record(
+    stream: &SampleStream,
+    file: String,
+    options: Vec<String>,
+    notes: &[ReadingNote],
+) -> ReadingRecord {
     let read = stream.rows_read();
     ReadingRecord {
         file,

@@ -1,15 +1,15 @@
 //! Columns of a recording: names, choice, units.
 
 mod column_selection;
-mod note;
 mod printable;
+mod reading_note;
 mod sensor;
 mod unit;
 
 pub(crate) use column_selection::{AvailableColumn, ChosenColumn, Role, as_they_are, known_by_name};
 pub use column_selection::{ColumnSelection, RowOptions, SelectionError, is_output_register};
-pub use note::Note;
 pub use printable::Printable;
+pub use reading_note::ReadingNote;
 pub(crate) use sensor::INERTIAL;
 pub use sensor::{SensorChannel, SensorChannels};
 pub(crate) use unit::{COUNT, SECOND, Unit};

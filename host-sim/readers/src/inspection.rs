@@ -5,7 +5,7 @@ mod sensor_guess;
 mod steady_part;
 mod unit_guess;
 
-use crate::columns::{ColumnSelection, Note, SensorChannels};
+use crate::columns::{ColumnSelection, ReadingNote, SensorChannels};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::rows::{BATCH, Batch, PaddingFinder, WholeTable};
@@ -75,7 +75,7 @@ pub struct InspectedTable {
     /// If times, index or rate tell it.
     pub steady_s: Option<TimeRange>,
     pub proposals: Vec<Proposal>,
-    pub notes: Vec<Note>,
+    pub notes: Vec<ReadingNote>,
 }
 
 impl InspectedTable {
@@ -117,7 +117,7 @@ impl InspectedTable {
             inspected.rate = placed.stamps.as_ref().and_then(|stamps| stamps.rate);
             inspected.missing = placed.missing;
             inspected.gaps = placed.gaps;
-            inspected.notes.extend(placed.stamps.iter().flat_map(StampQuality::notes).map(Note::from));
+            inspected.notes.extend(placed.stamps.iter().flat_map(StampQuality::notes).map(ReadingNote::from));
         }
         if let Some(SteadyPart { rows, .. }) = &mut inspected.steady {
             let rate_hz = inspected.rate.map(|rate| rate.hz).or(table.rate_hz);

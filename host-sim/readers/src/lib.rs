@@ -7,7 +7,7 @@ pub mod inspection;
 mod rows;
 
 pub use columns::{
-    ACCELEROMETER, ColumnSelection, GYROSCOPE, MAGNETOMETER, Note, Printable, RowOptions, SelectionError,
+    ACCELEROMETER, ColumnSelection, GYROSCOPE, MAGNETOMETER, Printable, ReadingNote, RowOptions, SelectionError,
     SensorChannel, SensorChannels, is_output_register,
 };
 pub use formats::file_format::{FileFormat, HEAD_BYTES, InputFile, TopicDescription, files_of_bag};

@@ -13,7 +13,7 @@ pub mod time_base;
 pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial};
 pub use file_format::ReadOptions;
 pub use readers::{
-    ColumnSelection, FileBytes, FileHash, InputError, MemoryArray, MemoryColumn, MemoryTable, Note, Number, Printable,
-    ReadMonitor, ReadPass, Reason, SelectionError, inspection, read_on_one_thread,
+    ColumnSelection, FileBytes, FileHash, InputError, MemoryArray, MemoryColumn, MemoryTable, Number, Printable,
+    ReadMonitor, ReadPass, ReadingNote, Reason, SelectionError, inspection, read_on_one_thread,
 };
 pub use reading::{count_table, row_writer, sample_stream};

@@ -1,8 +1,7 @@
 //! The columns of channels, time and index with their units, as the user says or by their names.
 
 use crate::columns;
-use crate::columns::note::Note;
-use crate::columns::{COUNT, INERTIAL, Printable, SECOND, SensorChannel, SensorChannels, Unit};
+use crate::columns::{COUNT, INERTIAL, Printable, ReadingNote, SECOND, SensorChannel, SensorChannels, Unit};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Role {
@@ -203,14 +202,14 @@ impl ColumnSelection {
         available: &[AvailableColumn],
         chosen: &[ChosenColumn],
         sensor: &SensorChannels,
-    ) -> Vec<Note> {
+    ) -> Vec<ReadingNote> {
         // Positions may be those of a whole row.
         let is_used = |at: &usize| chosen.iter().any(|column| column.label == available[*at].name);
         if !self.assignments.is_empty() {
             let is_other = |name: &&String| !self.read_by_others.contains(name);
             let others = available.iter().enumerate().filter(|(at, _)| !is_used(at)).map(|(_, column)| &column.name);
             let others = others.filter(is_other).cloned().collect();
-            return Note::on_columns(others, "left out: --columns does not name it").into_iter().collect();
+            return ReadingNote::on_columns(others, "left out: --columns does not name it").into_iter().collect();
         }
         let named = by_name(available, sensor).unwrap_or_default();
         let unitless = self.unitless_companions(&named, available);
@@ -242,7 +241,7 @@ impl ColumnSelection {
                 "taken to be in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise",
             ),
         ];
-        notes.into_iter().filter_map(|(columns, statement)| Note::on_columns(columns, statement)).collect()
+        notes.into_iter().filter_map(|(columns, statement)| ReadingNote::on_columns(columns, statement)).collect()
     }
 
     fn unit_of_interface(&self, column: &ChosenColumn) -> Option<Unit> {
@@ -415,28 +414,6 @@ fn names(available: &[AvailableColumn]) -> String {
     let shown: Vec<&str> = available.iter().take(SHOWN).map(|column| column.name.as_str()).collect();
     let more = if available.len() > SHOWN { ", …" } else { "" };
     format!("{}{more}", shown.join(", "))
-}
-
-/// `a[0…8]` are nine elements of an array.
-pub(super) fn listed(names: &[String]) -> String {
-    let element = |name: &str| {
-        let (array, number) = name.strip_suffix(']')?.rsplit_once('[')?;
-        Some((array.to_owned(), number.parse::<usize>().ok()?))
-    };
-    let mut all: Vec<String> = Vec::new();
-    let mut rest = names;
-    while let Some((first, after)) = rest.split_first() {
-        let follows = |(at, name): &(usize, &String)| {
-            element(first).is_some_and(|(array, start)| element(name) == Some((array, start + at)))
-        };
-        let elements = rest.iter().enumerate().take_while(follows).count();
-        match element(first).filter(|_| elements > 1) {
-            Some((array, start)) => all.push(format!("{array}[{start}…{}]", start + elements - 1)),
-            None => all.push(first.clone()),
-        }
-        rest = if elements > 1 { &rest[elements..] } else { after };
-    }
-    all.join(", ")
 }
 
 /// The unit that names a column of times; minutes are parts of a time.
@@ -613,9 +590,9 @@ fn role_of(name: &str) -> Option<NamedRole> {
 #[cfg(test)]
 mod tests {
     use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
-    use crate::columns::{Note, SensorChannels};
+    use crate::columns::{ReadingNote, SensorChannels};
 
-    fn sentences(notes: &[Note]) -> Vec<String> {
+    fn sentences(notes: &[ReadingNote]) -> Vec<String> {
         notes.iter().map(ToString::to_string).collect()
     }
 

@@ -1,7 +1,7 @@
 //! DataFlash logs of ArduPilot (`.bin`): IMU messages, and batches of raw samples (ISBH, ISBD). The crate
 //! `ardupilot-binlog` 0.2 panics at a stated length below 3.
 
-use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Note, Unit};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, ReadingNote, Unit};
 use crate::formats::message_layout::Scalar;
 use crate::formats::topics::{EachRow, Offer, Source, Topic};
 use crate::input::{Budget, FileBytes, InputError, Metered, Reason};
@@ -130,7 +130,10 @@ impl Source for ArduPilotSource<'_> {
             each(&picked)
         })?;
         let note = format!("{skipped} bytes of the log are no message and are skipped");
-        Ok(Ending { damage: None, notes: Some(note).filter(|_| skipped > 0).map(Note::from).into_iter().collect() })
+        Ok(Ending {
+            damage: None,
+            notes: Some(note).filter(|_| skipped > 0).map(ReadingNote::from).into_iter().collect(),
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Named arrays of NumPy, MATLAB and HDF5, and the tables that they form.
 
-use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Note, Unit, known_by_name};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, ReadingNote, Unit, known_by_name};
 use crate::formats::message_layout::Scalar;
 use crate::formats::topics::{EachRow, Offer, Source, Stop, Topic};
 use crate::input::{Budget, InputError, Reason};
@@ -311,7 +311,7 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
             columns.iter().map(|&column| self.places[self.members[topic][column]]).collect();
         let first = places.first().map_or(0, |(array, _)| *array);
         let note = |(hz, by): &(f64, String)| format!("the file states a rate of {hz} Hz ({by})");
-        let notes = self.stated_rate(topic, columns).map(note).map(Note::from).into_iter().collect();
+        let notes = self.stated_rate(topic, columns).map(note).map(ReadingNote::from).into_iter().collect();
         if let Some(array) =
             places.iter().map(|(array, _)| &self.arrays[*array]).find(|of| of.rows != self.arrays[first].rows)
         {

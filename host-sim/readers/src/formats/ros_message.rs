@@ -1,6 +1,6 @@
 //! Rows of ROS messages: inertial columns and times.
 
-use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Note};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, ReadingNote};
 use crate::formats::message_layout::{Encoding, MessageColumn, MessageLayout};
 use crate::formats::topics::Topic;
 use crate::rows::{Number, TopicSensor};
@@ -141,7 +141,7 @@ impl<'a> RosRows<'a> {
         row
     }
 
-    pub(crate) fn notes(&self) -> Vec<Note> {
+    pub(crate) fn notes(&self) -> Vec<ReadingNote> {
         let unset = "the stamps of the messages are not set; the times at which they were recorded stand for them";
         self.is_unset.filter(|unset| *unset).map(|_| unset.to_owned().into()).into_iter().collect()
     }

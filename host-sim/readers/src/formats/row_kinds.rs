@@ -11,6 +11,8 @@ const LEAST_ROWS: usize = 2;
 const NUMBERED: &str = "id i device device_id deviceid sensor sensor_id sensorid node node_id imu imu_id instance \
     sensor_type sensortype type";
 const LEAST_NUMBERS: usize = 2;
+/// Columns whose words are states of one sensor, between blanks.
+const STATES: &str = "state status mode valid validity is_valid quality fix flag flags event activity phase";
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum RowKind {
@@ -53,17 +55,19 @@ pub(crate) struct RowKinds(
 );
 
 impl RowKinds {
-    /// `None` for one kind.
-    pub(crate) fn find(rows: &[Vec<&str>]) -> Option<Self> {
+    /// By a column of labels; `None` for one kind.
+    pub(crate) fn find(rows: &[Vec<&str>], heading: &[&str]) -> Option<Self> {
         let width = rows.iter().map(Vec::len).min()?;
-        (0..width).find_map(|at| Self::of_labels(rows, at, is_label))
+        let is_state = |at: &usize| heading.get(*at).is_some_and(|name| is_one_of(name, STATES));
+        (0..width).filter(|at| !is_state(at)).find_map(|at| Self::of_labels(rows, at, is_label))
     }
 
     /// By a column that numbers devices.
     pub(crate) fn find_by_number(rows: &[Vec<&str>], heading: &[&str]) -> Option<Self> {
-        let plain = |name: &str| name.to_lowercase().trim_start_matches(['#', '%', ' ']).to_owned();
-        let is_named = |name: &&str| NUMBERED.split(' ').any(|known| known == plain(name));
-        let at = heading.iter().position(is_named).filter(|at| rows.iter().all(|row| row.len() > *at))?;
+        let at = heading
+            .iter()
+            .position(|name| is_one_of(name, NUMBERED))
+            .filter(|at| rows.iter().all(|row| row.len() > *at))?;
         Self::of_labels(rows, at, |field| field.parse::<u32>().is_ok())
     }
 
@@ -149,6 +153,12 @@ impl RowKinds {
     }
 }
 
+/// True for a heading among `known` names, which stand between blanks.
+fn is_one_of(heading: &str, known: &str) -> bool {
+    let plain = heading.to_lowercase();
+    known.split(' ').any(|name| name == plain.trim_matches(['#', '%', ' ']))
+}
+
 /// No number, time or missing value; an address in hexadecimal digits may begin with a digit.
 fn is_label(field: &str) -> bool {
     let is_address = || {
@@ -170,7 +180,16 @@ mod tests {
 
     fn kinds(rows: &[&str]) -> Option<Vec<String>> {
         let rows: Vec<Vec<&str>> = rows.iter().map(|row| row.split(',').collect()).collect();
-        RowKinds::find(&rows).map(names)
+        RowKinds::find(&rows, &[]).map(names)
+    }
+
+    #[test]
+    fn the_states_of_a_sensor_are_no_sensors() {
+        let rows: Vec<Vec<&str>> =
+            ["0,5,A", "1,6,V", "2,7,A", "3,8,V"].iter().map(|row| row.split(',').collect()).collect();
+        for (heading, expected) in [("Status", None), ("source", Some(vec!["A".to_owned(), "V".to_owned()]))] {
+            assert_eq!(RowKinds::find(&rows, &["t", "gx", heading]).map(names), expected, "{heading}");
+        }
     }
 
     #[test]

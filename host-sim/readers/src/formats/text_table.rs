@@ -1,6 +1,8 @@
 //! Tables of numbers in text: CSV, sentences, named numbers.
 
-use crate::columns::{AvailableColumn, COUNT, ChosenColumn, Note, Role, RowOptions, SelectionError, Unit, as_they_are};
+use crate::columns::{
+    AvailableColumn, COUNT, ChosenColumn, ReadingNote, Role, RowOptions, SelectionError, Unit, as_they_are,
+};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
 use crate::formats::fields::{leading_number, number, split, with_unit};
 use crate::formats::nmea::{self, Sentence};
@@ -108,7 +110,7 @@ pub(crate) struct TextTable {
     layout: Layout,
     /// Stated before the rows, Hz.
     rate_hz: Option<f64>,
-    columns_notes: Vec<Note>,
+    columns_notes: Vec<ReadingNote>,
     damaged: DamagedRows,
     is_lenient: bool,
     /// Rows begin with a letter.
@@ -181,7 +183,7 @@ struct Opened<'a> {
 impl Opened<'_> {
     fn columns(self, topic: Option<&str>, mut head: TableHead) -> Result<TextTable, InputError> {
         let fail = |reason| self.file.error(reason);
-        let kinds = RowKinds::find(&head.fields());
+        let kinds = RowKinds::find(&head.fields(), &head.last_names());
         if kinds.is_none() {
             head.leave_preamble();
         }
@@ -346,7 +348,7 @@ impl RowSource for TextTable {
 }
 
 impl TextTable {
-    fn notes(&self) -> Vec<Note> {
+    fn notes(&self) -> Vec<ReadingNote> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let zeros = self.lines.zero_bytes();
         let mut counted = vec![(zeros, format!("{zeros} bytes that are zero are left out"))];
@@ -365,7 +367,7 @@ impl TextTable {
         };
         counted.push((*others, format!("{others} {what}")));
         let counted = counted.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text);
-        let of_rows = of_rate.into_iter().chain(self.damaged.notes()).chain(counted).map(Note::from);
+        let of_rows = of_rate.into_iter().chain(self.damaged.notes()).chain(counted).map(ReadingNote::from);
         self.columns_notes.iter().cloned().chain(of_rows).collect()
     }
 

@@ -1,7 +1,7 @@
 //! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
 use crate::columns::{
-    AvailableColumn, ChosenColumn, ColumnSelection, Note, RowOptions, SensorChannels, Unit, as_they_are,
+    AvailableColumn, ChosenColumn, ColumnSelection, ReadingNote, RowOptions, SensorChannels, Unit, as_they_are,
 };
 use crate::input::{Budget, InputError, Reason};
 use crate::rows::{self, Ending, Number, Refusal, RowSource, TopicSensor, WholeTable};
@@ -244,7 +244,7 @@ pub(crate) struct TopicRows<'a> {
     source: Box<dyn Source + 'a>,
     topic: usize,
     chosen: Vec<ChosenColumn>,
-    notes: Vec<Note>,
+    notes: Vec<ReadingNote>,
     limits: FileLimits,
 }
 
@@ -283,10 +283,13 @@ impl<'a> TopicRows<'a> {
         }
         let sensor = choice.sensor.map(|at| &topic.sensors[at]);
         let chosen = choose_columns(topic, sensor, options).map_err(fail)?;
-        let mut notes: Vec<Note> = Vec::new();
+        let mut notes: Vec<ReadingNote> = Vec::new();
         let states_units = |selection: &ColumnSelection| selection.has_units();
         notes.extend(
-            sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)).map(Note::from),
+            sensor
+                .and_then(|sensor| sensor.note.clone())
+                .filter(|_| !states_units(&options.selection))
+                .map(ReadingNote::from),
         );
         notes.extend(options.selection.notes(&topic.columns, &chosen, &options.sensor));
         let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));

@@ -1,6 +1,6 @@
 //! ULog of PX4: sensors by message or FIFO, and any message. The crate `px4-ulog` follows nested formats without limit.
 
-use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, Note};
+use crate::columns::{ACCELEROMETER, AvailableColumn, GYROSCOPE, ReadingNote};
 use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
 use crate::formats::topics::{EachRow, Offer, Source, Topic};
 use crate::input::{Budget, FileBytes, InputError, OpenBytes, Reason};
@@ -247,7 +247,7 @@ impl Source for UlogSource<'_> {
         let name = &self.offer.topics[topic].name;
         let note =
             format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out");
-        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).map(Note::from).into_iter().collect() })
+        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).map(ReadingNote::from).into_iter().collect() })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Rows of any format as batches.
 
-use crate::columns::{ChosenColumn, Note, Role};
+use crate::columns::{ChosenColumn, ReadingNote, Role};
 use crate::input::{Budget, InputError, ReadMonitor, Reason, StreamError};
 use crate::rows::{Batch, BatchBuilder, HELD_ROWS, Number, RegisterField, RowFault, ValueColumn, usual_unit};
 use std::path::Path;
@@ -24,7 +24,7 @@ pub(crate) enum Refusal {
 pub(crate) struct Ending {
     /// The source ends early.
     pub(crate) damage: Option<Reason>,
-    pub(crate) notes: Vec<Note>,
+    pub(crate) notes: Vec<ReadingNote>,
 }
 
 impl Ending {
@@ -80,7 +80,7 @@ pub struct RowsRead {
     pub padding: u64,
     pub is_stopped: bool,
     pub damage: Option<String>,
-    pub notes: Vec<Note>,
+    pub notes: Vec<ReadingNote>,
 }
 
 impl RowsRead {
@@ -264,7 +264,8 @@ impl<'a> FileRows<'a> {
         delivery.finish(file)?;
         let backwards = delivery.builder.backwards().map_err(|reason| InputError::file(file, reason))?;
         let rows = delivery.builder.rows();
-        let notes_of_rows = backwards.into_iter().chain(delivery.builder.notes()).chain(delivery.notes).map(Note::from);
+        let notes_of_rows =
+            backwards.into_iter().chain(delivery.builder.notes()).chain(delivery.notes).map(ReadingNote::from);
         let notes = notes_of_rows.chain(ending.notes).collect();
         let outside = delivery.filter.rows.saturating_sub(delivery.filter.kept);
         Ok(RowsRead { rows, outside, padding: 0, is_stopped, damage, notes })

@@ -1,6 +1,6 @@
 //! Whole columns of a source.
 
-use crate::columns::{AvailableColumn, ChosenColumn, Note, Unit};
+use crate::columns::{AvailableColumn, ChosenColumn, ReadingNote, Unit};
 use crate::input::InputError;
 use crate::rows::{BatchBuilder, Refusal, RowSource};
 use std::path::Path;
@@ -60,7 +60,7 @@ pub(crate) struct WholeTable {
     pub(crate) is_cut: bool,
     /// The source ended early; a note says why.
     pub(crate) is_damaged: bool,
-    pub(crate) notes: Vec<Note>,
+    pub(crate) notes: Vec<ReadingNote>,
 }
 
 impl WholeTable {
@@ -83,7 +83,7 @@ impl WholeTable {
             Err(error) => Some(format!("{error}; the {} rows before that are shown", builder.rows())),
         };
         self.is_damaged = damage.is_some();
-        self.notes.extend(damage.map(Note::from));
+        self.notes.extend(damage.map(ReadingNote::from));
         let column = |(chosen, values): (ChosenColumn, Vec<f64>)| WholeColumn {
             column: AvailableColumn { name: chosen.label, unit: chosen.unit },
             values,

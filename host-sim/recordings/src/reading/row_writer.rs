@@ -4,7 +4,7 @@ use crate::batch_source::for_each_batch;
 use crate::counts::count_table_writer::write_text;
 use crate::counts::numpy_matrix::{MatrixWriter, SiUnit};
 use crate::file_format::{ReadOptions, RecordedInput};
-use readers::Note;
+use readers::ReadingNote;
 use readers::{Batch, RowsRead, StreamError, ValueColumn, WantedRows};
 use std::fmt::Write as _;
 use std::io;
@@ -35,7 +35,7 @@ pub enum WriteError {
 pub struct WrittenRows {
     pub columns: Vec<String>,
     /// Remarks for the user, one sentence each.
-    pub notes: Vec<Note>,
+    pub notes: Vec<ReadingNote>,
     pub is_complete: bool,
 }
 
@@ -131,7 +131,7 @@ impl SensorRows<'_> {
         let RowsRead { damage, notes, .. } = read;
         Ok(WrittenRows {
             columns: names,
-            notes: notes.into_iter().chain(damage.map(Note::from)).collect(),
+            notes: notes.into_iter().chain(damage.map(ReadingNote::from)).collect(),
             is_complete,
         })
     }

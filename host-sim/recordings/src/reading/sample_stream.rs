@@ -10,7 +10,7 @@ use measurement::{
     ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, SensorProfile, adis16405,
     lost_part,
 };
-use readers::Note;
+use readers::ReadingNote;
 use readers::{
     ACCELEROMETER, BATCH, ColumnQuantizer, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, ReadMonitor, ReadPass,
     RowBefore, Unpadded, WantedRows,
@@ -100,7 +100,7 @@ pub struct SampleStream {
 struct SurveyedSamples {
     beginning: Measurement,
     description: RecordingDescription,
-    notes: Vec<Note>,
+    notes: Vec<ReadingNote>,
     /// `beginning` is all.
     is_in_memory: bool,
 }
@@ -200,7 +200,7 @@ impl SampleStream {
 
     /// Remarks for the user, one sentence each.
     #[must_use]
-    pub fn notes(&self) -> &[Note] {
+    pub fn notes(&self) -> &[ReadingNote] {
         &self.samples.notes
     }
 
@@ -587,7 +587,7 @@ impl Survey {
         }
     }
 
-    fn notes(&self) -> Vec<Note> {
+    fn notes(&self) -> Vec<ReadingNote> {
         let unfilled = self.columns.iter().filter(|of| of.quantizer.is_none());
         let unfilled = unfilled.map(|StreamedColumn { column, survey, .. }| {
             let what = if survey.is_zero() {
@@ -601,7 +601,7 @@ impl Survey {
         let of_samples = self.full_scale_notes.iter().cloned().chain(unfilled).chain(self.missing_notes());
         let of_samples = of_samples.chain(rounding_note(rounded));
         let of_times = self.stamps.iter().flat_map(StampQuality::notes).chain(self.clock.note().map(str::to_owned));
-        self.read.notes.iter().cloned().chain(of_samples.chain(of_times).map(Note::from)).collect()
+        self.read.notes.iter().cloned().chain(of_samples.chain(of_times).map(ReadingNote::from)).collect()
     }
 
     /// Channels with equal counts share a note.
