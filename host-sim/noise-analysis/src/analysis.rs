@@ -6,9 +6,8 @@
 //!                                                                             └► FirstHalf: errors on the second half ───┘
 //! ```
 //!
-//! Effects are named on the whole record. The errors before and after come from models of the first half alone, compared
-//! with the second half, both by time: as it was recorded, and without what the rules for spikes and knocks exclude that were
-//! fitted to the first half.
+//! Effects are named on the whole record. The errors before and after come from models of the first half alone, compared with the second
+//! half, both by time: as it was recorded, and without what the rules for spikes and knocks exclude that were fitted to the first half.
 
 use crate::OCTAVES;
 use crate::effects::Effect;
@@ -38,8 +37,7 @@ use std::fmt;
 pub enum Stage {
     /// Looks for what the samples show before models are fitted to them.
     Preprocessing,
-    /// Fits the models of the whole record, and those of the first half, which are compared with the second; names the effects of the
-    /// first half alone.
+    /// Fits the models of the whole record, and those of its first half, which are compared with the second; names the effects of the half.
     Models,
     /// Names the effects of the whole record.
     Effects,
@@ -48,7 +46,6 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Their number.
     pub const COUNT: usize = 4;
 }
 

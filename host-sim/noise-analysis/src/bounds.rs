@@ -25,37 +25,28 @@ impl MeasuredValue {
 pub struct BoundedEstimate {
     /// Likeliest value.
     pub value: f64,
-    /// Lower 95 % bound.
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
 }
 
 /// An estimate with its 95 % bounds, in the unit of a channel, or in that over another unit, which the name of the field says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelEstimate {
-    /// Likeliest value.
     pub value: f64,
-    /// Lower 95 % bound.
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
     /// Unit of the channel, such as `deg/s`.
     pub unit: &'static str,
 }
 
-/// An estimated number with its 95 % bounds, as a report lists it. A term that the data does not show has the value and the lower
-/// bound 0.
+/// An estimated number with its 95 % bounds, as a report lists it. A term that the data does not show has the value and the lower bound 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Estimate.
     pub value: f64,
-    /// Lower 95 % bound.
     pub low: f64,
     /// Upper 95 % bound; infinite if unknown.
     #[serde(deserialize_with = "unbounded")]
     pub high: f64,
-    /// Unit of all three.
     pub unit: String,
 }
 
@@ -65,7 +56,6 @@ pub(crate) fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f6
 }
 
 impl BoundedEstimate {
-    /// `value` between `low` and `high`.
     #[must_use]
     pub const fn new(value: f64, low: f64, high: f64) -> Self {
         Self { value, low, high }
@@ -77,13 +67,11 @@ impl BoundedEstimate {
         Self::new(value, value, value)
     }
 
-    /// As a parameter in `unit`.
     #[must_use]
     pub fn parameter(self, unit: impl Into<String>) -> Parameter {
         Parameter::new(self.value, self.low, self.high, unit)
     }
 
-    /// The estimate in the unit of a channel.
     #[must_use]
     pub const fn in_unit(self, unit: &'static str) -> ChannelEstimate {
         ChannelEstimate { value: self.value, low: self.low, high: self.high, unit }
@@ -119,13 +107,11 @@ impl ChannelEstimate {
         self.estimate().error()
     }
 
-    /// As a parameter in the unit of the channel.
     #[must_use]
     pub fn parameter(self) -> Parameter {
         self.estimate().parameter(self.unit)
     }
 
-    /// As a parameter in the unit of the channel over `per`.
     #[must_use]
     pub fn parameter_per(self, per: &str) -> Parameter {
         self.estimate().parameter(format!("{}/{per}", self.unit))
@@ -139,12 +125,10 @@ impl ChannelEstimate {
 }
 
 impl Parameter {
-    /// `value` between `low` and `high`, all three in `unit`.
     pub fn new(value: f64, low: f64, high: f64, unit: impl Into<String>) -> Self {
         Self { value, low, high, unit: unit.into() }
     }
 
-    /// Without the unit.
     #[must_use]
     pub const fn estimate(&self) -> BoundedEstimate {
         BoundedEstimate::new(self.value, self.low, self.high)

@@ -17,8 +17,7 @@ pub fn upper_tail(z: f64) -> f64 {
     Normal::standard().sf(z)
 }
 
-/// Probability that a variable of Student's distribution with so many degrees of freedom exceeds `value`; 1 where that is no number, or
-/// where there is no freedom.
+/// Probability that a variable of Student's distribution exceeds `value`; 1 where that is no number, or where there is no freedom.
 #[must_use]
 pub fn student_tail(value: f64, freedom: f64) -> f64 {
     match StudentsT::new(0.0, 1.0, freedom) {
@@ -53,8 +52,7 @@ pub(crate) fn chi_squared_quantile(probability: f64, count: f64) -> f64 {
     ChiSquared::new(count).map_or(f64::INFINITY, |of| of.inverse_cdf(probability))
 }
 
-/// Probability that the mean of `above` exponential variables exceeds `ratio` times the mean of `below` others; 1 where one of these is
-/// no positive number.
+/// Probability that the mean of `above` exponential variables exceeds `ratio` times that of `below` others; 1 where one is not positive.
 pub(crate) fn mean_ratio_tail(ratio: f64, above: f64, below: f64) -> f64 {
     let tail = checked_beta_reg(below, above, below / (below + above * ratio));
     tail.ok().filter(|tail| !tail.is_nan()).unwrap_or(1.0)
@@ -70,8 +68,7 @@ pub fn poisson_tail(count: u64, mean: f64) -> f64 {
     }
 }
 
-/// 95 % bounds of the mean of a Poisson distribution that has yielded `count` (Byar's approximation of Garwood's exact
-/// bounds).
+/// 95 % bounds of the mean of a Poisson distribution that has yielded `count` (Byar's approximation of Garwood's exact bounds).
 pub(crate) fn poisson_bounds(count: f64) -> (f64, f64) {
     let bound = |count: f64, z: f64| count * (1.0 - 1.0 / (9.0 * count) + z / (3.0 * count.sqrt())).powi(3);
     let low = if count > 0.0 { bound(count, -NORMAL_975).max(0.0) } else { 0.0 };

@@ -1,8 +1,7 @@
 //! The kinds of effects beyond the baseline noise model, by theme: each as numbers, with its share of the Allan variance, its course over
 //! time, and what makes the effects of two channels one cause.
 //!
-//! The [name](Effect::name) of an effect and those of its [parameters](Effect::parameters) are for tables and files; nothing in the
-//! analysis depends on them.
+//! [Names](Effect::name) of effects and of their [parameters](Effect::parameters) are for tables and files; the analysis uses none.
 //!
 //! In every kind a name ends with its unit (`_s`, `_hz`, `_percent`), times are counted from the first sample, `sigmas` is a significance in
 //! standard deviations, and `p_value` the probability by chance anywhere in the record, in white, flicker and walking noise of any mixture
@@ -62,7 +61,6 @@ macro_rules! kinds {
         )*
 
         impl Effect {
-            /// The name of every kind.
             pub const NAMES: &[&str] = &[$($name),*];
 
             /// Name of the kind in tables and files, such as `sinusoid`.
@@ -131,8 +129,7 @@ impl Effect {
         self.kind().parameters().into_iter().map(|named| (named.name, named.parameter)).collect()
     }
 
-    /// The parameters that say how large it is: the channel with the narrowest interval of one of these for its value shows it most
-    /// clearly.
+    /// The parameters that say how large it is: the channel with the narrowest interval of one of these for its value shows it best.
     pub(crate) fn sizes(&self) -> impl Iterator<Item = BoundedEstimate> {
         self.kind().parameters().into_iter().filter(|named| named.is_size).map(|named| named.parameter.estimate())
     }
@@ -143,7 +140,6 @@ impl Effect {
         lasting.map(|named| (named.name, named.parameter.estimate())).collect()
     }
 
-    /// True if both are of one kind.
     pub(crate) fn is_of_kind(&self, other: &Self) -> bool {
         std::mem::discriminant(self) == std::mem::discriminant(other)
     }
@@ -154,7 +150,6 @@ impl Effect {
         matches!(self, Self::SinusoidalLine(_) | Self::ResonantLine(_) | Self::SquareWave(_))
     }
 
-    /// Its frequency, Hz; `None` if it is not at one.
     #[must_use]
     pub fn frequency_hz(&self) -> Option<BoundedEstimate> {
         match self.kind().occurrence() {

@@ -18,10 +18,9 @@
 //! | `nonstationarity` | whether the noise changes while the record is made, and what the models are fitted to then |
 //! | `report` | what is reported of a channel and of the sensor |
 //!
-//! [`analysis::analyze`] is the pipeline from a recording to its [`report::Report`]. [`quick`] makes the report of the curves alone,
-//! from samples that are read in blocks. Either fits a part of a recording by one function, `halves::traced_part`. A record has means
-//! in the place of samples, of one sample each where it is short; [`record::long_record`] condenses a recording that is too long to
-//! be kept.
+//! [`analysis::analyze`] is the pipeline from a recording to its [`report::Report`]. [`quick`] makes the report of the curves alone, from
+//! samples that are read in blocks. Either fits a part of a recording by one function, `halves::traced_part`. A record has means in the
+//! place of samples, of one sample each where it is short; [`record::long_record`] condenses a recording that is too long to be kept.
 
 pub mod analysis;
 pub mod bounds;

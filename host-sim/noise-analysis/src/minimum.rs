@@ -53,8 +53,7 @@ fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
     a.0 - 0.5 * ((a.0 - b.0) * to_b - (a.0 - c.0) * to_c) / (to_b - to_c)
 }
 
-/// Distance of the vertex of a parabola through three values from the middle one, at most 1 in units of their spacing; 0 of one that has no
-/// maximum.
+/// Distance of a parabola's vertex through three values from the middle one, at most 1 spacing; 0 where it has no maximum.
 pub(crate) fn summit([left, middle, right]: [f64; 3]) -> f64 {
     let curvature = 2.0 * middle - left - right;
     if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-1.0, 1.0) } else { 0.0 }

@@ -1,5 +1,4 @@
-//! Non-stationarity: changes of the noise over a record, and the errors on the second half of models that allow for
-//! them.
+//! Non-stationarity: changes of the noise over a record, and the errors on the second half of models that allow for them.
 //!
 //! ```text
 //! Series ─► EpochCurves ─► Stationarity ─► FittedPart: which part of the first half the model of a channel is fitted to
@@ -52,16 +51,12 @@ pub struct Nonstationarity {
     /// The parameters that change among the epochs of the first half.
     pub tracked: TrackedSet,
     pub epoch_s: f64,
-    /// The parameters in each epoch of the record.
     pub epochs: Vec<EpochParameters>,
     /// Deviance per point of `after` on the second half, beyond the drift expected from the first half.
     pub beyond_drift: f64,
     pub tracking: TrackingErrors,
-    /// Predictions without added terms.
     pub baselines: Baselines,
-    /// Prediction intervals of each epoch's octaves.
     pub intervals: IntervalCoverage,
-    /// A line of another channel whose frequency moves with this channel's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub related_line: Option<RelatedLine>,
 }

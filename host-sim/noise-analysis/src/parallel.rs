@@ -33,7 +33,6 @@ pub fn on_at_most<R>(threads: usize, task: impl FnOnce() -> R) -> R {
     task()
 }
 
-/// An analysis was cancelled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cancelled;
 
@@ -91,7 +90,6 @@ impl Drop for Rest<'_> {
     }
 }
 
-/// The next item, and its position.
 fn taken<'a, T>(next: &AtomicUsize, items: &'a [T]) -> Option<(usize, &'a T)> {
     let at = next.fetch_add(1, Ordering::Relaxed);
     Some((at, items.get(at)?))

@@ -1,10 +1,8 @@
 //! The report of an analysis as plain data: the source of the JSON schema, of the terminal table and of the page.
 //!
-//! A report does not name the source of its samples: a recording that is read from a file and the same recording replayed
-//! over the bus give the same bytes.
+//! A report does not name the source of its samples: a file and the same recording replayed over the bus give the same bytes.
 //!
-//! A name ends with its unit (`_s`, `_hz`, `_percent`); `low` and `high` are 95 % bounds; what has the name of a coefficient or of a deviation is
-//! in the `unit` beside it.
+//! Names end with their units (`_s`, `_hz`, `_percent`); `low` and `high` are 95 % bounds; coefficients and deviations are in `unit`.
 
 pub mod assessment;
 pub mod comparison;
@@ -50,7 +48,6 @@ pub struct Report {
     pub dropped: BTreeMap<String, u64>,
     /// Samples that are used although a warning was raised, by cause.
     pub flagged: BTreeMap<String, u64>,
-    /// Properties that the sensor has once for all its channels.
     pub part: PartReport,
     /// Causes that the baseline models lack, one entry each.
     #[serde(skip)]
@@ -66,7 +63,6 @@ pub struct Report {
     pub channels: Vec<ChannelReport>,
 }
 
-/// Numbers of samples by cause, as a report has them.
 pub(crate) fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
     counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
@@ -85,7 +81,6 @@ pub struct PartReport {
     pub taps: Option<Parameter>,
     /// Samples of the sensor's own clock from one recorded sample to the next.
     pub decimation: Option<Parameter>,
-    /// Properties that the record does not identify, and the reasons.
     pub notes: Vec<PartNote>,
 }
 
@@ -105,11 +100,9 @@ pub enum PartNote {
     StatedClock { sample_rate_hz: f64 },
     /// There are no time stamps to measure the clock by.
     NoTimeStamps {
-        /// The part's nominal clock, Hz.
         nominal_hz: f64,
         /// The sample rate at that clock, with 95 % bounds, Hz.
         sample_rate_hz: BoundedEstimate,
-        /// The sample rate that is stated, Hz.
         stated_hz: f64,
     },
     /// The spectra give the length of the filter; the taps follow from the nominal clock.
@@ -120,7 +113,6 @@ pub enum PartNote {
         taps: u16,
         /// Taps that have the same length, at another clock.
         other_taps: Vec<u16>,
-        /// The part's nominal clock, Hz.
         nominal_hz: f64,
     },
     /// A channel's own decimation is farther from the common one than chance explains.
@@ -144,15 +136,12 @@ pub struct ChannelReport {
     pub unit: String,
     /// Samples that arrived and were used as a whole, in every channel.
     pub samples: u64,
-    /// Samples that the channel's model lacks.
     #[serde(flatten)]
     pub missing: MissingSamples,
     /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
-    /// Allan deviation of the second half as recorded, which the models of the first half have not seen, at the first averaging times of
-    /// `curve`: as many as the half has.
+    /// Allan deviation of the second half as recorded, unseen by the models, at the first averaging times of `curve`, as many as it has.
     pub unseen_adev: Vec<f64>,
-    /// The coefficients by the slope method.
     pub read_off: SlopeMethodReport,
     /// The baseline model: angle random walk, bias instability, rate random walk.
     pub before: ModelReport,
@@ -163,20 +152,16 @@ pub struct ChannelReport {
     /// Against the second half, of the curve of the first half taken for a model. A model that describes the first half exactly
     /// leaves as much: it is what the second half does not repeat.
     pub first_half_curve: ModelErrorReport,
-    /// The model of `after`, fitted once more to the whole record. Its errors are those of `after`: the whole record leaves no
-    /// data that it has not seen.
+    /// The model of `after`, fitted once more to the whole record; its errors are those of `after`, because no unseen data is left.
     #[serde(rename = "final")]
     pub refitted: ModelReport,
-    /// How the noise changes in the course of the record; absent of a record that is too short to be cut into epochs, and of
-    /// channels other than gyros and accelerometers.
+    /// How the noise changes in the course of the record: of gyros and accelerometers, where the record is long enough for epochs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonstationarity: Option<Nonstationarity>,
     /// Stretches in which the sensor was at rest: those without a motion of any channel.
     pub at_rest: Vec<Stretch>,
-    /// Assessment of the model for use in navigation.
     #[serde(rename = "practice")]
     pub assessment: Assessment,
-    /// Data of the figures beside the Allan deviation.
     #[serde(flatten)]
     pub figure_data: FigureData,
 }
@@ -184,7 +169,6 @@ pub struct ChannelReport {
 /// Samples that are missing in a channel, counted apart: lost on the way, refused by cause, replaced by the estimator.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct MissingSamples {
-    /// Samples that never arrived.
     pub lost: u64,
     /// Samples that arrived and are not used, by cause: those that the reader refused in all channels or in this one, and
     /// what the analysis keeps out of the coefficients (`repeated`, `spikes`, `knock`).
@@ -207,8 +191,7 @@ pub struct CurvePoint {
     pub high: f64,
     /// Equivalent degrees of freedom.
     pub edf: f64,
-    /// Share of the samples that were missing and replaced from their neighbours, %. 0 where the differences over gaps are
-    /// left out.
+    /// Share of the samples that were missing and replaced from their neighbours, %. 0 where the differences over gaps are left out.
     #[serde(default)]
     pub replaced_percent: f64,
     /// `100/sqrt(2(N/n−1))`: the percentage accuracy of a point in the slope method, for `N` samples.
@@ -217,8 +200,7 @@ pub struct CurvePoint {
     /// Allan deviation by equation (5) from the measured spectrum, in the channel's unit; absent at averaging times of more
     /// than a sixteenth of the record, which the spectrum does not resolve.
     pub adev_by_spectrum: Option<f64>,
-    /// Allan deviation of rounding errors that are correlated, a part of `adev` and of that of the models; 0 where they are white, and
-    /// so a part of N.
+    /// Allan deviation of correlated rounding errors, a part of `adev` and of the models'; 0 where they are white, and so a part of N.
     #[serde(default)]
     pub rounding: f64,
 }
@@ -274,8 +256,7 @@ pub struct ModelReport {
     pub fitted: ModelErrorReport,
     /// Against the second half of the record as it was recorded, which was not used in the fit.
     pub unseen: ModelErrorReport,
-    /// Against the second half without what the rules for spikes and knocks exclude that were fitted to the first half;
-    /// absent where they exclude nothing.
+    /// Against the second half without the spikes and knocks that the rules of the first half exclude; absent where they exclude nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen_excluding: Option<ModelErrorReport>,
     /// The spikes and knocks that the model foretells; absent where the first half has none, and of the baseline model.
@@ -292,18 +273,15 @@ pub struct TermReport {
     pub unit: String,
 }
 
-/// Error of a model over the octaves with `n ≤ M/8` of a part of `M` samples, and its largest deviation over all octaves;
-/// absent when there are none with `n ≤ M/8`.
+/// Error of a model over the octaves with `n ≤ M/8` of `M` samples, absent without any, and its largest deviation over all octaves.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ModelErrorReport {
     /// `mean edf·(ln(m/v) + v/m − 1)`; 1 is what a true model scores on the data that it was fitted to.
     pub deviance_per_point: Option<f64>,
     /// `100·sqrt(mean (½ ln(v/m))²)`.
     pub rms_percent: Option<f64>,
-    /// The largest deviation of a point in standard deviations over *all* octaves; positive where the measured variance
-    /// exceeds the model.
+    /// The largest deviation of a point in standard deviations over *all* octaves; positive where the measured variance exceeds the model.
     pub worst_sigma: Option<f64>,
-    /// Averaging time of that point, s.
     pub worst_tau_s: Option<f64>,
     /// Modelled over measured Allan deviation of that point.
     pub worst_ratio: Option<f64>,
@@ -340,8 +318,7 @@ pub struct DataSheetReport {
     pub curve: Vec<DataSheetDeviation>,
 }
 
-/// Root of the one-sided power spectral density of a channel as it was recorded, unit/√Hz, by ascending frequency. Lines that
-/// stand out of a band have a point of their own.
+/// Root of the one-sided density of a channel as recorded, unit/√Hz, by ascending frequency; lines out of a band have their own point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpectrumReport {
     pub frequency_hz: Vec<f64>,
@@ -359,8 +336,7 @@ pub struct BiasOverTime {
     /// Middle of each block, s from the first sample. Blocks without half of their samples are left out.
     pub time_s: Vec<f64>,
     pub mean: Vec<f64>,
-    /// The part that the channel's findings explain: steps, a ramp, and the share of temperature, supply and specific force. Empty
-    /// if they explain nothing.
+    /// The part that the channel's findings explain: steps, a ramp, temperature, supply and specific force. Empty if they explain nothing.
     pub followed: Vec<f64>,
 }
 
@@ -385,7 +361,6 @@ impl SlopeMethodReport {
 }
 
 impl TermReport {
-    /// A term of a model of a channel in `unit`.
     #[must_use]
     pub fn new(term: &FittedTerm, unit: &str) -> Self {
         Self { term: *term, white_noise: None, unit: unit.to_owned() }
@@ -452,7 +427,6 @@ pub fn term_reports(model: &Model, unit: &str, resolution: f64) -> Vec<TermRepor
 }
 
 impl ModelErrorReport {
-    /// The error of `model` against `curve`.
     #[must_use]
     pub fn new<const POINTS: usize>(model: &Model, curve: &Curve<POINTS>) -> Self {
         let error = allan_core::model::Discrepancy::between(model, curve);

@@ -14,9 +14,6 @@ pub(crate) use sensor::INERTIAL;
 pub use sensor::{SensorChannel, SensorChannels};
 pub(crate) use unit::{COUNT, SECOND, Unit};
 
-/// Those of a gyroscope.
 pub const GYROSCOPE: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-/// Those of an accelerometer.
 pub const ACCELEROMETER: [&str; 3] = ["accl_x", "accl_y", "accl_z"];
-/// Those of a magnetometer.
 pub const MAGNETOMETER: [&str; 3] = ["magn_x", "magn_y", "magn_z"];

@@ -17,7 +17,6 @@ use time_base::{RateEstimate, StampQuality, TimeBaseError, TimeRange};
 pub use crate::inspection::sensor_guess::{ColumnGuess, Proposal};
 pub use crate::inspection::steady_part::SteadyPart;
 
-/// A column of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InspectedColumn {
     pub name: String,
@@ -63,7 +62,6 @@ pub struct InspectedTable {
     pub is_damaged: bool,
     pub columns: Vec<InspectedColumn>,
     pub rate: Option<RateEstimate>,
-    /// Stated, Hz.
     pub stated_rate_hz: Option<f64>,
     /// By time stamps, s.
     pub duration_s: Option<f64>,

@@ -16,7 +16,6 @@ pub(crate) fn field(channel: Channel) -> RegisterField {
     RegisterField { place: channel as usize, limits: channel.limits() }
 }
 
-/// A column of values with the profile of its channel.
 pub(crate) type ProfiledColumn = ValueColumn<ChannelProfile>;
 
 pub(crate) fn channel(register: Option<RegisterField>) -> Option<Channel> {
@@ -56,7 +55,6 @@ impl<'a> BatchSource<'a> {
         }
     }
 
-    /// See [`for_each_batch`].
     pub(crate) fn for_each_batch(
         &mut self,
         wanted: WantedRows,

@@ -21,7 +21,6 @@ pub struct TimeStamp {
 }
 
 impl TimeStamp {
-    /// No index; `time_s` in s.
     pub fn from_time(time_s: f64) -> Self {
         Self { index: None, time_s: Some(time_s) }
     }
@@ -42,7 +41,6 @@ impl Verdict {
     }
 }
 
-/// One sample of all channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordedSample {
     pub time_stamp: TimeStamp,
@@ -78,7 +76,6 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Starts an empty recording of `channels`.
     pub fn new(mut channels: Vec<Channel>, range: GyroRange) -> Self {
         channels.sort();
         // Equal counts of all six inertial channels mark repeats and frozen outputs; fewer may be chance.
@@ -106,7 +103,6 @@ impl Recorder {
         &self.recording.channels
     }
 
-    /// Adds a burst.
     pub fn push(&mut self, time_stamp: TimeStamp, burst: &Burst) {
         let Verdict { faults, refused, .. } = self.judge(burst);
         self.recording.samples.push(RecordedSample { time_stamp, counts: burst.counts(), faults, refused });
@@ -123,7 +119,6 @@ impl Recorder {
         self.recording.range = range;
     }
 
-    /// The recording of all bursts that were added.
     pub fn finish(self) -> Recording {
         self.recording
     }

@@ -172,6 +172,7 @@ fn a_terminal_shows_how_far_the_reading_is() {
     let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_imunoise"), pipe.display());
     let mut program = Command::new("script")
         .args(["--quiet", "--return", "--command", &command, "/dev/null"])
+        .env("TERM", "xterm") // without it a terminal is taken to show no bar
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()

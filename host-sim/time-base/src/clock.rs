@@ -1,5 +1,4 @@
-//! Sample periods of rows by stamps or index, and repeated rows; fine stamps are placed at once, coarse ones at the
-//! end.
+//! Sample periods of rows by stamps or index, and repeated rows; fine stamps are placed at once, coarse ones at the end.
 
 use crate::irregular_stamps::of_few_digits;
 use crate::lateness_track::COARSE;
@@ -40,7 +39,6 @@ pub struct RowStamp {
     pub is_equal: bool,
 }
 
-/// The place of a row in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     At(Placed),
@@ -91,7 +89,6 @@ struct KnownPlaces {
     stamps: StampQuality,
 }
 
-/// Tells repeated samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct RepeatRule {
     /// Largest interval, s; 0 for none.
@@ -219,8 +216,7 @@ impl Clock {
     /// Sample rate, Hz, of `samples` usable samples over `periods`.
     ///
     /// # Errors
-    /// It has fewer than 4 samples, no two neighbours, gaps that are more than 64 times as long as the samples, or no
-    /// rate.
+    /// It has fewer than 4 samples, no two neighbours, gaps more than 64 times as long as the samples, or no rate.
     pub fn rate_hz(
         &self,
         samples: u64,

@@ -60,7 +60,6 @@ pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamp
     Some(AlignedStamps { periods, quality: StampQuality { is_rate_changing: true, is_of_loop: true, ..fine } })
 }
 
-/// True for ticks of many samples.
 pub(crate) fn is_of_many(times: &[f64], tick_s: f64) -> bool {
     let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
     tick_s * (times.len() as f64) > MANY * span_s && span_s > 0.0

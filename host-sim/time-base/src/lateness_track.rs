@@ -48,9 +48,7 @@ pub(crate) const MIN_RATE_ERROR: f64 = 1e-9;
 pub struct RateEstimate {
     /// Least-squares slope, Hz.
     pub hz: f64,
-    /// Lower end, Hz.
     pub low_hz: f64,
-    /// Upper end, Hz.
     pub high_hz: f64,
 }
 
@@ -105,7 +103,6 @@ impl Track {
         best
     }
 
-    /// As [`refined`](Self::refined).
     pub(crate) fn new(times: &[f64], period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
         Self::of_lateness(lateness(times, period_s), period_s, tick_s, (queue, least))
     }

@@ -57,7 +57,6 @@ impl StampOrder {
         (intervals.len() >= 4).then(|| quantile(&mut intervals, 1, 2))
     }
 
-    /// Judges the stamp of the next row.
     pub fn judge(&mut self, stamp: f64) -> Order {
         let time = stamp + self.offset;
         let Some(last) = self.last.back().copied().filter(|last| time < *last) else {

@@ -3,7 +3,6 @@
 use crate::indexed_clock::{ClockStep, IndexedClock};
 use crate::lateness_track::{COARSE, LostStretch, RateEstimate};
 
-/// Result of an alignment.
 pub(crate) struct AlignedStamps {
     /// From the first; grows by at least one.
     pub(crate) periods: Vec<u64>,

@@ -30,7 +30,6 @@ pub(crate) struct BiasSensitivity {
     pub sensitivity: f64,
     /// Standard deviation of the sensitivity.
     pub error: f64,
-    /// Degrees of freedom of `error`.
     pub degrees_of_freedom: f64,
     /// Time constant, s, over which the regressor was smoothed; 0 if it is as measured.
     pub smoothed_over_s: f64,
@@ -46,7 +45,6 @@ pub(crate) struct BiasChanges {
     pub responses: Vec<BiasResponse>,
 }
 
-/// Measured quantities that the bias may depend on.
 struct Covariates<'a> {
     regressors: Vec<(usize, DVector<f64>)>,
     temperature: Option<(usize, TemperatureCourse)>,
@@ -66,14 +64,12 @@ enum Candidate {
 struct Accepted {
     candidate: Candidate,
     regressor: DVector<f64>,
-    /// Probability of as good an explanation by chance.
     p_value: f64,
 }
 
-/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of
-/// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations`
-/// may shake the channel. Of slow changes rounding makes steps smaller than `least_step`, in the channel's unit, which is asked for where
-/// there is a step.
+/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of them lacks are
+/// not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations` may shake the channel. Of
+/// slow changes rounding makes steps smaller than `least_step`, in the channel's unit, which is asked for where there is a step.
 pub(crate) fn find(
     series: &Series,
     regressors: &[&Series],
@@ -98,7 +94,6 @@ fn covers(regressor: &Series, series: &Series) -> bool {
     regressor.slots == series.slots || series.count_common(regressor) as f64 >= LEAST_COMMON * series.slots.len() as f64
 }
 
-/// [`find`] for series with samples in the same sample periods.
 fn find_on_common_samples(
     series: &Series,
     regressors: &[(usize, &Series)],

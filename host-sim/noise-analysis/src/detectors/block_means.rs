@@ -3,7 +3,6 @@
 use crate::samples::series::Series;
 use nalgebra::DVector;
 
-/// Number of blocks in a record.
 pub const BLOCKS: usize = 128;
 const LEAST_FILL: f64 = 0.25;
 const FEWEST_SLOTS: u64 = 16;
@@ -12,7 +11,6 @@ const FEWEST_BLOCKS: usize = BLOCKS / 4;
 /// Least change of a mean, in steps of the resolution: smaller ones are rounding errors of floats.
 const LEAST_CHANGE: f64 = 1e-6;
 
-/// Means of the blocks of a record.
 pub struct BlockMeans {
     pub width: u64,
     pub numbers: Vec<usize>,

@@ -28,7 +28,6 @@ impl ChangeOfLevel {
         Self { gains }
     }
 
-    /// Number of places.
     pub(super) fn len(&self) -> usize {
         self.gains.len()
     }
@@ -38,7 +37,6 @@ impl ChangeOfLevel {
         self.likeliest(places, |at| self.gains[at])
     }
 
-    /// The same for the change back.
     pub(super) fn place_of_return(&self, places: Range<usize>) -> [usize; 3] {
         self.likeliest(places, |at| -self.gains[at])
     }

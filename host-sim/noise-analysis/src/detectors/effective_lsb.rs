@@ -18,7 +18,6 @@ pub(crate) fn counts_per_step(series: &Series) -> u32 {
     if changes < FEWEST_CHANGES { 1 } else { u32::try_from(divisor).unwrap_or(1).max(1) }
 }
 
-/// Reports a step of more than one count.
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let counts = counts_per_step(series);
     if counts == 1 {

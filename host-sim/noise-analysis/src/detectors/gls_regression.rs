@@ -37,7 +37,6 @@ pub struct GlsRegression<'a> {
 }
 
 struct GlsFit {
-    /// Index of its mixture.
     mixture: usize,
     residual: f64,
     log_determinant: f64,
@@ -76,7 +75,6 @@ impl<'a> GlsRegression<'a> {
         self.estimates_below(f64::INFINITY, regressors)
     }
 
-    /// [`estimate`](Self::estimate) if the p-value is below `limit`.
     pub(super) fn estimate_below(&self, limit: f64, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
         self.estimates_below(limit, std::slice::from_ref(regressor)).pop()?
     }
@@ -109,7 +107,6 @@ impl<'a> GlsRegression<'a> {
         (0..products.ncols()).map(sizes).collect()
     }
 
-    /// True if any of the sizes may have a p-value below `limit`.
     pub(super) fn any_may_be_below(&self, limit: f64, sizes: &[Option<Sizes>]) -> bool {
         let least_part = self.least_part(limit);
         sizes.iter().flatten().any(|sizes| self.reaches(least_part, sizes))

@@ -62,12 +62,10 @@ impl KnockSearch {
         (search, found)
     }
 
-    /// The loud stretches of each channel in another part of the recording.
     pub(crate) fn find(&self, series: &[Series], repeated: &[u64]) -> Vec<LoudStretches> {
         self.find_beside(find_by(&self.knocks, series, BlockSize::Many), series, repeated)
     }
 
-    /// The same beside the `long` knocks of each channel.
     fn find_beside(&self, long: Vec<Vec<Knock>>, series: &[Series], repeated: &[u64]) -> Vec<LoudStretches> {
         let Self { knocks: rules, spikes: spike_rules } = self;
         let mut knocks = long;

@@ -1,8 +1,7 @@
 //! Knocks: stretches of some samples to minutes whose noise level the stretches on both sides exclude.
 //!
-//! Blocks of several lengths are tested at several averaging times. [`SIGNIFICANCE`] is divided equally among all of
-//! them. The likeliest stretch around a loud block is the knock; the rest is tested again. The time of a knock is
-//! tested in the other channels alone.
+//! Blocks of several lengths are tested at several averaging times. [`SIGNIFICANCE`] is divided equally among all of them. The likeliest
+//! stretch around a loud block is the knock; the rest is tested again. The time of a knock is tested in the other channels alone.
 
 use super::change_point::ChangeOfLevel;
 use super::noise_levels::{
@@ -179,7 +178,6 @@ impl KnockRule {
         Self { scales, floor }
     }
 
-    /// True if [`Moving::OwnLength`] and [`Moving::AnyLength`] differ.
     fn moves_at_other_lengths(&self) -> bool {
         self.scales.iter().any(|scale| scale.moving.is_some())
     }

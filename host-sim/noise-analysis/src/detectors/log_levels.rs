@@ -8,15 +8,13 @@ pub(super) const LEAST_BLOCKS: usize = 64;
 /// Fewest blocks on either side; a shorter stretch is a knock.
 const LEAST_ON_A_SIDE: usize = 4;
 
-/// Logarithms of the levels of blocks.
 pub(super) struct LogLevels {
     /// Number of each block, and logarithm of its mean square of differences.
     pub(super) of_blocks: Vec<(f64, f64)>,
 }
 
-/// Levels with one change.
 pub(super) struct TwoLevels {
-    /// Number of blocks before it.
+    /// Number of blocks before the change.
     pub(super) before: usize,
     /// Sum of the squares around the two means.
     pub(super) squares: f64,
@@ -62,7 +60,6 @@ impl LogLevels {
         around_mean
     }
 
-    /// Highest ln likelihood of one change.
     pub(super) fn log_likelihood_of_change(&self) -> Option<f64> {
         Some(self.two()?.log_likelihood(self.of_blocks.len() as f64))
     }

@@ -49,7 +49,6 @@ pub(super) struct NoiseMixture {
     pub log_determinant: f64,
 }
 
-/// Regressors that are compared with the means.
 pub(super) struct Regressors {
     pub coordinates: DMatrix<f64>,
     /// On the size of each regressor (row) in each mixture (column).
@@ -125,8 +124,7 @@ impl NoiseGrid {
         })
     }
 
-    /// Effective number of independent tests of a step in each mixture: Σ acos ρ/π with the correlation ρ of neighbouring
-    /// steps.
+    /// Effective number of independent tests of a step in each mixture: Σ acos ρ/π with the correlation ρ of neighbouring steps.
     pub(super) fn independent_steps(&self) -> impl Iterator<Item = f64> {
         let blocks = self.information(&self.basis);
         let steps = &self.steps().information;

@@ -57,7 +57,6 @@ pub(super) struct SquaredDifferences {
     start: u64,
     /// Number of differences of the series, with those that are missing.
     count: usize,
-    /// In the order of their numbers.
     differences: Vec<f64>,
     /// Number and position of the first difference after each gap.
     runs: Vec<(usize, usize)>,
@@ -124,7 +123,6 @@ impl SquaredDifferences {
         later.checked_sub(1).map_or(0, |run| (self.runs[run].1 + number - self.runs[run].0).min(end))
     }
 
-    /// Number of the difference at a position.
     fn number_at(&self, position: usize) -> usize {
         let (first, from) = self.runs[self.runs.partition_point(|(_, from)| *from <= position) - 1];
         first + position - from
@@ -220,8 +218,7 @@ struct Covariances {
 }
 
 impl Covariances {
-    /// From all `differences`, or from [`STRETCHES`] of a long record. A gap, and the end of a stretch, is as long as the longest lag at
-    /// most.
+    /// From all `differences`, or [`STRETCHES`] of a long record; a gap or a stretch's end is as long as the longest lag at most.
     fn new(differences: &SquaredDifferences) -> Self {
         let of = &differences.differences;
         let (stretches, length) = if of.len() > 2 * STRETCHES * STRETCH { (STRETCHES, STRETCH) } else { (1, of.len()) };
@@ -260,7 +257,6 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// Levels of the blocks of a record, one after the other.
 pub(super) struct BlockLevels {
     /// Number of blocks, with those that have no level.
     pub(super) count: usize,
@@ -369,7 +365,6 @@ fn running_medians(values: &[f64], width: usize) -> Vec<f64> {
     medians
 }
 
-/// Scatter of the levels of one block length around those nearby.
 pub(super) struct LevelScatter {
     /// Each level over the median around it, in ascending order.
     ratios: Vec<f64>,

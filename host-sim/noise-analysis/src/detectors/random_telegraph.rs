@@ -32,8 +32,7 @@ const SLOW_FRACTION: f64 = 0.01;
 /// Parts of a time constant per change: a decay loses a fifth.
 const PER_CHANGE: f64 = 4.0;
 
-/// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
-/// in s.
+/// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown, in s.
 pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times: &[f64]) -> Option<TelegraphNoise> {
     let samples = series.values().len();
     let known = correlation_times.iter().map(|time| ((time / RESOLVED / series.sample_period()) as usize).max(1));
@@ -100,9 +99,8 @@ impl Law {
 /// True if a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
 /// quarter of `time_constant` s. Disturbances that begin at once and decay do not.
 ///
-/// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
-/// root of the sum of their sixth powers is about a standard normal number; neighbouring changes have correlations below 0,
-/// which lower it.
+/// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the root of the
+/// sum of their sixth powers is about a standard normal number; neighbouring changes have correlations below 0, which lower it.
 pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
     let size = ((time_constant / PER_CHANGE / series.sample_period()) as usize).max(1);
     let means = PartMeans::new(series, size).means;

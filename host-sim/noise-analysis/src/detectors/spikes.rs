@@ -71,7 +71,6 @@ struct FoundSpike {
     sigmas: f64,
     /// True if it is a filter's response to an earlier spike.
     is_response: bool,
-    /// True if it stands out of the noise around it.
     stands_out: bool,
 }
 
@@ -126,7 +125,6 @@ impl FoundSpikes {
         Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }
     }
 
-    /// The spikes that stand out of the noise around each of them.
     pub(crate) fn out_of_noise(&self) -> Self {
         self.kept(|spike| spike.stands_out)
     }
@@ -342,7 +340,7 @@ fn near_by_chance(events: usize, samples: u64) -> f64 {
 
 struct Interpolation {
     weights: [f64; REACH],
-    /// The autocovariance of the channel; `None` until it is known.
+    /// `None` until it is known.
     covariance: Option<Autocovariance>,
     mean: f64,
     /// Standard deviation of its error, at least half a count.
@@ -607,7 +605,6 @@ fn against_louder_noise(errors: Vec<f64>, most: f64) -> Vec<f64> {
     errors.iter().zip(levels).map(|(error, level)| error / louder(level)).collect()
 }
 
-/// Positions less than `length` from `position`.
 fn nearer_than(position: usize, length: usize) -> Range<usize> {
     (position + 1).saturating_sub(length)..position + length
 }

@@ -25,7 +25,6 @@ pub(super) struct TwoStateChain {
     pub(super) distance_error: f64,
 }
 
-/// Expected statistics of the hidden states.
 #[derive(Default)]
 struct StateStatistics {
     log_likelihood: f64,
@@ -37,8 +36,7 @@ struct StateStatistics {
 }
 
 impl TwoStateChain {
-    /// The likeliest chain by expectation maximisation (L. Baum et al., Ann. Math. Statist. 41, 1970), if it nears
-    /// `least`.
+    /// The likeliest chain by expectation maximisation (L. Baum et al., Ann. Math. Statist. 41, 1970), if it nears `least`.
     pub(super) fn fit(values: &[f64], least: f64) -> Option<Self> {
         let mut present: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let half = present.len() / 2;
@@ -119,7 +117,6 @@ impl TwoStateChain {
         (self.levels[1] - self.levels[0]).abs()
     }
 
-    /// Fraction of the time at each level.
     pub(super) fn occupancy(&self) -> [f64; 2] {
         let both = self.leave[0] + self.leave[1];
         [self.leave[1] / both, self.leave[0] / both]

@@ -9,9 +9,7 @@ use serde::Serialize;
 pub struct CurveEvidence {
     /// `σ/σ_model − 1` at the averaging time where it is most significant.
     pub excess: f64,
-    /// Averaging time of the excess, s.
     pub tau_s: f64,
-    /// The excess in standard deviations.
     pub sigmas: f64,
     /// Gain of the fit by the term, in standard deviations.
     pub gain_sigmas: f64,
@@ -52,7 +50,6 @@ pub struct Multiples {
 }
 
 impl Multiples {
-    /// Number of lines.
     #[must_use]
     pub fn count(&self) -> usize {
         self.harmonics.len() + self.sidebands

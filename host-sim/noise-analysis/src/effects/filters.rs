@@ -21,7 +21,6 @@ pub struct OutputFilter {
     pub white_noise: ChannelEstimate,
     /// Number of moving averages behind each other.
     pub stages: u8,
-    /// The part's own sample rate, Hz.
     pub internal_rate_hz: f64,
     pub evidence: CurveEvidence,
 }

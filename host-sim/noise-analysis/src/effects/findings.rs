@@ -41,8 +41,7 @@ pub struct Finding {
     /// Position in `channels` of the one that shows it most clearly.
     pub clearest: usize,
     pub validated: Validation,
-    /// By channel: the part of the channel's Allan variance that is due to this cause, in percent, at the averaging time where
-    /// it is largest.
+    /// By channel: the part of its Allan variance that is due to this cause, in percent, at the averaging time where it is largest.
     pub share_percent: BTreeMap<String, f64>,
     /// By channel: that part at the octave next to a minute, the part of the variance of an angle or a velocity that was integrated for so
     /// long. Without the channels of records below some eight minutes.
@@ -79,7 +78,6 @@ impl Detection {
     }
 }
 
-/// A correction that removes an effect from a channel's samples.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Correction {
     /// The samples of these sample periods, in ascending order, become gaps.

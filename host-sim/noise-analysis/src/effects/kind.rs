@@ -9,7 +9,6 @@ use measurement::Quantity;
 pub(crate) trait Kind {
     fn parameters(&self) -> Vec<NamedParameter>;
 
-    /// How often a part has it.
     fn occurrence(&self) -> Occurrence {
         Occurrence::InChannel
     }
@@ -32,8 +31,7 @@ pub(crate) struct NamedParameter {
     pub parameter: Parameter,
     /// True if it says how large the effect is.
     pub is_size: bool,
-    /// True if any two stretches of a record have it alike where the effect lasts. It describes the distribution of the samples, and
-    /// nothing that happens once.
+    /// True if any two stretches of a record have it alike where the effect lasts: it describes the samples' distribution, no single event.
     pub lasts: bool,
 }
 
@@ -68,7 +66,6 @@ pub(crate) enum Occurrence {
 }
 
 impl Occurrence {
-    /// True if two effects of one kind are one cause.
     pub(super) fn is_one_cause(self, other: Self, is_same_unit: bool) -> bool {
         match (self, other) {
             (Self::Once, Self::Once) => true,
@@ -118,20 +115,17 @@ impl std::iter::Sum for AddedVariance {
     }
 }
 
-/// An averaging time of a channel of a record.
 pub(crate) struct AveragingTime<'a> {
     /// Averaging factor, samples.
     pub n: u64,
     pub period_s: f64,
     pub samples: u64,
-    /// Allan variance of the channel's model.
     pub model_avar: f64,
     /// Allan deviation of the channel of this quantity and axis, where there is one.
     pub adev_of: &'a dyn Fn(Quantity, &str) -> Option<f64>,
 }
 
 impl AveragingTime<'_> {
-    /// In s.
     pub(crate) fn tau_s(&self) -> f64 {
         self.n as f64 * self.period_s
     }
@@ -172,8 +166,7 @@ impl BiasBlocks<'_> {
 pub(super) mod tests {
     use super::{AveragingTime, Kind};
 
-    /// Asserts that the Allan variance of `kind` at these averaging factors is that of `samples`, by its definition, within `tolerance`
-    /// of itself.
+    /// Asserts that the Allan variance of `kind` at these averaging factors is that of `samples`, by definition, within a `tolerance`.
     pub(in crate::effects) fn assert_avar(
         kind: &dyn Kind,
         samples: &[f64],

@@ -1,5 +1,4 @@
-//! Processes with an exponential autocovariance: the Gauss-Markov process, and what has its Allan variance without being Gaussian or of
-//! one channel.
+//! Processes with an exponential autocovariance: Gauss-Markov, and what has its Allan variance and is not Gaussian or not of one channel.
 
 use super::evidence::CurveEvidence;
 use super::kind::{AddedVariance, AveragingTime, Kind, NamedParameter, Occurrence, named};
@@ -20,8 +19,7 @@ pub struct MarkovProcess {
 #[serde(rename_all = "snake_case")]
 pub enum MarkovEvidence {
     Curve(CurveEvidence),
-    /// The spectrum, which is flat below a corner where a random walk would rise.
-    /// The gain is in ln likelihood.
+    /// The spectrum, which is flat below a corner where a random walk would rise. The gain is in ln likelihood.
     Spectrum {
         corner_hz: f64,
         gain: f64,

@@ -8,8 +8,7 @@ pub struct ResponseVariance {
 }
 
 impl ResponseVariance {
-    /// The variance of a bias whose mean over each stretch of `width` periods of `period_s` is known: from the averaging factor `width` on,
-    /// below which it hardly changes.
+    /// The variance of a bias by its means over stretches of `width` periods of `period_s`; below the factor `width` it hardly changes.
     pub(crate) fn from_means(means: &[f64], width: u64, period_s: f64) -> Self {
         // The sum of the bias over the first sample periods, at the ends of the stretches.
         let mut sums = vec![0.0];

@@ -40,7 +40,6 @@ pub struct EffectiveLsb {
     /// Smallest distance of two values; it is exact.
     #[serde(skip)]
     pub step: ChannelEstimate,
-    /// The same in counts.
     pub counts: u32,
     pub values: usize,
     pub changes: usize,
@@ -64,7 +63,6 @@ pub struct NoiseBelowCount {
     /// rounding it may be anything up to the upper bound.
     #[serde(skip)]
     pub deviation: ChannelEstimate,
-    /// The same in counts.
     pub counts: f64,
     /// Least deviation from which on rounding adds white noise alone, counts.
     pub dithered_counts: f64,

@@ -113,7 +113,6 @@ pub struct ThermalLag {
     /// In the unit per °C.
     #[serde(skip)]
     pub sensitivity: ChannelEstimate,
-    /// Time constant of the lag, s.
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     pub p_value: f64,

@@ -7,8 +7,7 @@ use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
 use serde::Serialize;
 
-/// A line with an even change of its amplitude or of its phase, as of a machine whose load changes, or of two machines whose speeds
-/// differ a little.
+/// A line whose amplitude or phase changes evenly, as of a machine whose load changes, or of two whose speeds differ a little.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModulatedLine {
     #[serde(skip)]
@@ -65,13 +64,10 @@ impl Kind for ModulatedLine {
 /// A line whose frequency runs evenly from one end of the record to the other, as that of a motor whose speed changes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Chirp {
-    /// Frequency at the beginning of the record, Hz.
     #[serde(skip)]
     pub start_hz: BoundedEstimate,
-    /// Frequency at its end, Hz.
     #[serde(skip)]
     pub end_hz: BoundedEstimate,
-    /// Change of the frequency, Hz/s.
     #[serde(skip)]
     pub rate_hz_per_s: BoundedEstimate,
     #[serde(skip)]
@@ -107,8 +103,7 @@ impl Kind for Chirp {
     }
 }
 
-/// Allan variance of a line whose frequency runs evenly from one to another, in Hz: the mean of those of sinusoids at each of the
-/// frequencies.
+/// Allan variance of a line whose frequency runs evenly from one to another, in Hz: the mean of those of sinusoids at each frequency.
 pub(crate) fn avar_of_run(amplitude: f64, [first, last]: [f64; 2], n: u64, period_s: f64) -> f64 {
     const FREQUENCIES: u32 = 32;
     let frequency = |number: u32| first + (last - first) * (f64::from(number) + 0.5) / f64::from(FREQUENCIES);
@@ -160,8 +155,7 @@ pub(crate) fn avar_of_harmonics(frequency: f64, amplitudes: impl Iterator<Item =
     (1..).map(f64::from).zip(amplitudes).map(of).sum()
 }
 
-/// Allan variance of a sinusoid of amplitude 1. Its closed form is that of the alias of a frequency beyond half the sample rate; one of 0 has
-/// none.
+/// Allan variance of a sinusoid of amplitude 1, beyond half the sample rate that of its alias; a frequency of 0 has none.
 fn avar_of_sine(frequency: f64, n: u64, period_s: f64) -> f64 {
     let avar = NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(n, period_s);
     if avar.is_finite() { avar } else { 0.0 }

@@ -37,7 +37,6 @@ pub enum Observation {
     Band { width_hz: f64, sigmas: f64, mismatch: BandMismatch },
     /// A level of the noise that follows the temperature.
     LevelByTemperature {
-        /// Lowest and highest temperature, °C.
         range_degc: [f64; 2],
         /// Part of the changes of the level that follow the temperature.
         explained: f64,

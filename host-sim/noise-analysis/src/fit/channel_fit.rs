@@ -21,8 +21,7 @@ use allan_core::trace::{LineCandidates, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelId, SensorProfile};
 
-/// Most that the deviance may rise with the other channels' filter: the right filter exceeds it by chance once in 600 times
-/// (χ² of one degree of freedom).
+/// Most that the deviance may rise with the others' filter: the right one exceeds it once in 600 times (χ², one degree of freedom).
 pub(super) const MAX_DEVIANCE_RISE: f64 = 10.0;
 
 /// Least part that the lower bound of white noise behind a filter has of its value where no other term stands in for it.
@@ -44,7 +43,6 @@ pub(crate) struct ChannelFit {
     pub curve: Curve<OCTAVES>,
     /// The baseline model, with the signals.
     pub before: Model,
-    /// The model with the added terms.
     pub traced: TracedModel,
     /// The Markov process of the model that the spectrum shows and the curve does not, if there is one.
     pub markov_by_spectrum: Option<MarkovEstimate>,
@@ -87,7 +85,6 @@ impl ChannelFit {
         }
     }
 
-    /// The baseline model alone.
     pub(crate) fn fit_baseline(covariates: CovariateFit) -> Self {
         let trace = Trace::baseline(&covariates.curve);
         Self::new(covariates, trace)
@@ -204,8 +201,7 @@ impl ChannelFit {
         self.traced.added().into_iter().filter_map(resonance).collect()
     }
 
-    /// True if the noise of the first `octaves` is large enough against the channel's `resolution` (in its unit) that
-    /// rounding adds white noise and nothing else.
+    /// True if the noise of the first `octaves` is so large against the `resolution` (in its unit) that rounding adds white noise alone.
     pub(crate) fn is_dithered(&self, profile: &SensorProfile, resolution: f64, octaves: usize) -> bool {
         is_dithered(&self.covariates.curve, resolution, profile.dithered_avar_counts2, octaves)
     }
@@ -226,14 +222,12 @@ impl ChannelFit {
         factors().zip(shares).map(|(n, share)| (self.after().avar(n) + share).sqrt()).collect()
     }
 
-    /// The model of the channel as it was sampled: the one with added terms, which does not describe the share of the
-    /// covariates, or with covariates the baseline model.
+    /// The model of the channel as it was sampled: with covariates the baseline model, because the one with added terms lacks their share.
     pub(crate) fn with_covariates(&self) -> &Model {
         if self.covariates.is_empty() { self.after() } else { &self.before }
     }
 
-    /// Fits the channel's other terms again with the filter that all channels of the sensor have, or, where the record does
-    /// not identify one, traces them again without a filter.
+    /// Fits the channel's other terms again with the sensor's filter or, where the record identifies none, traces them without one.
     ///
     /// A channel whose own trace added no filter takes the common one if it is dithered and the deviance, with
     /// [`COST_OF_A_TERM`] for each added term, does not rise by more than [`MAX_DEVIANCE_RISE`].
@@ -346,8 +340,7 @@ impl ChannelFit {
         true
     }
 
-    /// Adds those of `lines`, the lines of the spectrum, that the model has not: too weak to be traced in the curve, their power
-    /// would be that of the other terms.
+    /// Adds those of the spectrum's `lines` that the model lacks: too weak for the curve, their power would be that of the other terms.
     pub(crate) fn add_lines_of_spectrum(&mut self, lines: &[FittedTerm]) {
         let curve = &self.curve;
         let mut traced = self.traced.clone();
@@ -398,7 +391,6 @@ impl ChannelFit {
         ModelsBySamples { before, after, quantization_p_value }
     }
 
-    /// Takes these, where the samples have given them.
     pub(crate) fn take(&mut self, models: ModelsBySamples) {
         self.quantization_p_value = models.quantization_p_value;
         if let Ok(before) = models.before {
@@ -413,7 +405,6 @@ impl ChannelFit {
         }
     }
 
-    /// True if the curve contradicts a line of the spectrum.
     pub(crate) fn refutes(&self, line: &NoiseTerm) -> bool {
         self.refuted.contains(line)
     }
@@ -426,7 +417,6 @@ impl ChannelFit {
         }
     }
 
-    /// The residual of the model at the shortest averaging time.
     fn first_residual(&self) -> Residual {
         let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
         self.curve.points().first().map_or(nothing, |point| residual(self.after(), point))
@@ -473,8 +463,7 @@ fn traced_with_filter(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCa
     }
 }
 
-/// The terms of `traced` with the common filter in place of its white noise, fitted to `curve`. Terms that this leaves without an
-/// amplitude are left out.
+/// `traced` with the common filter in place of its white noise, fitted to `curve`, without terms that this leaves without an amplitude.
 fn with_filter(curve: &Curve<OCTAVES>, traced: &TracedModel, common: &PartFilter) -> TracedModel {
     let (white, mut others): (Vec<PlannedTerm>, Vec<PlannedTerm>) =
         traced.terms().partition(|(kind, _)| is_white(kind));
@@ -503,12 +492,10 @@ fn with_rounding(curve: &Curve<OCTAVES>, terms: &[PlannedTerm]) -> TracedModel {
     if is_shown && more.goodness.deviance < plain.goodness.deviance { more } else { plain }
 }
 
-/// White noise behind a filter, `filtered`, bias instability and random walk.
 fn behind(filtered: NoiseTerm) -> [NoiseTerm; 3] {
     [filtered, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk]
 }
 
-/// Traces what the noise [`behind`] a filter lacks of a curve.
 fn traced_behind(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandidates) -> Trace {
     let mut traced = Trace::baseline(curve);
     traced.after = fit(curve, &behind(filtered));

@@ -1,8 +1,7 @@
 //! The place at which a curve contradicts a model, also at averaging times with few degrees of freedom.
 //!
-//! A deviation in standard deviations hides a model that is several times the measurement at the longest averaging times: a
-//! variance with four degrees of freedom cannot be more than 3.5 cube-root standard deviations below any model. The exact
-//! tail of χ² has no such limit.
+//! A deviation in standard deviations hides a model that is several times the measurement at the longest averaging times: a variance with
+//! four degrees of freedom cannot be more than 3.5 cube-root standard deviations below any model. The exact tail of χ² has no such limit.
 
 use allan_core::confidence::octave_correlation;
 use allan_core::{AllanPoint, Curve, Model};
@@ -11,15 +10,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Probability that some averaging time contradicts a true model, as the 95 % bounds of the reports allow.
 pub const CHANCE: f64 = 0.05;
-/// Degrees of freedom above which χ² is replaced by the normal distribution: the tails then differ by less than `1e-3` of
-/// their logarithm.
+/// Degrees of freedom above which χ² is replaced by the normal distribution: the tails then differ by less than `1e-3` of their logarithm.
 const MANY_DEGREES: f64 = 1e6;
 
-/// The averaging time at which a measured variance is least probable under a model, where that is less probable than
-/// [`CHANCE`].
+/// The averaging time at which a measured variance is least probable under a model, where that is less probable than [`CHANCE`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Contradiction {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Modelled over measured Allan deviation.
     pub ratio: f64,
@@ -37,8 +33,7 @@ impl Contradiction {
         Self::find_by(model, curve, |point| (model.avar(point.n), model.edf(point)))
     }
 
-    /// The same of `model` with what is added to it: `predicted` has the Allan variance of both at a point, and the degrees of freedom
-    /// of a variance that measures it.
+    /// The same with additions: `predicted` has the Allan variance of all at a point, and the degrees of freedom of one that measures it.
     pub(crate) fn find_by<const POINTS: usize>(
         model: &Model,
         curve: &Curve<POINTS>,

@@ -53,7 +53,6 @@ impl RegressionData {
         }
     }
 
-    /// Calls `work` with the regression of the channel on its covariates.
     fn regress<T>(&self, work: impl FnOnce(&CovariateRegression<OCTAVES>) -> T) -> T {
         let covariance = |with: Option<usize>, covariate: usize, n: u64| {
             let curve = match with {
@@ -70,8 +69,7 @@ impl RegressionData {
 }
 
 impl CovariateFit {
-    /// Estimates the sensitivities of `channel` from the second differences in `part`, and takes
-    /// those from `by_samples` where these have the smaller error.
+    /// Estimates the sensitivities of `channel` from second differences in `part`, or takes those of `by_samples` with a smaller error.
     ///
     /// With a ramp (`has_ramp`) the sensitivities to temperature and supply come from the samples alone: the second
     /// differences of a ramp correlate with those of anything else that drifts.
@@ -119,8 +117,7 @@ impl CovariateFit {
             .regress(|regression| regression.compensated(&self.sensitivities))
     }
 
-    /// The part of the channel's Allan variance that the covariates add at each of `factors`, in ascending order, by the covariances in
-    /// `part`.
+    /// The part of the channel's Allan variance that the covariates add at each of the ascending `factors`, by the covariances in `part`.
     ///
     /// Longer averaging times than those at which the covariances are known, as of a record in two halves, have the last
     /// share that is known, times the ratio of what the covariates themselves vary at the two times. For that, `avar` is the
@@ -156,7 +153,6 @@ impl CovariateFit {
         factors.map(share).collect()
     }
 
-    /// The covariates that the channel depends on, with the sensitivity to each.
     pub(crate) fn sensitivities(&self) -> impl Iterator<Item = (ChannelId, &Sensitivity)> {
         self.sensitivities.iter().map(|sensitivity| (self.data.channels[sensitivity.covariate], sensitivity))
     }
@@ -188,8 +184,7 @@ impl CovariateFit {
     }
 }
 
-/// Subtracts `sensitivity` times the change of `covariate` since its first sample; both have the same samples. No sample depends on a later one
-/// by this.
+/// Subtracts `sensitivity` times the change of `covariate`, which has the same samples, since its first: nothing depends on a later one.
 fn subtract(series: &mut Series, sensitivity: f64, covariate: &Series) {
     let first = covariate.values.first().copied().unwrap_or(0.0);
     for (value, covariate) in series.values_mut().iter_mut().zip(covariate.values.iter()) {
@@ -197,7 +192,6 @@ fn subtract(series: &mut Series, sensitivity: f64, covariate: &Series) {
     }
 }
 
-/// The channels of `part` that `channel` may depend on.
 fn regressors(channel: ChannelId, part: &RecordPart) -> impl Iterator<Item = ChannelId> {
     let quantities: &[Quantity] = match part.channels[channel].quantity {
         Quantity::AngularRate => &[Quantity::Temperature, Quantity::SupplyVoltage, Quantity::SpecificForce],

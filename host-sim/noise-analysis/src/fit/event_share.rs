@@ -38,8 +38,7 @@ pub struct EventsReport {
     /// Standard deviation of the difference of their share in the variance from one half to the next, over the share, %: by how the
     /// energy of the events is spread over the first half.
     pub scatter_percent: f64,
-    /// Root of their share in the Allan variance at each point of the curve, in the channel's unit. It is contained in `adev` of the
-    /// model.
+    /// Root of their share in the Allan variance at each point of the curve, in the channel's unit. It is contained in `adev` of the model.
     pub adev: Vec<f64>,
 }
 
@@ -67,8 +66,7 @@ impl EventShare {
         self.count == 0
     }
 
-    /// Their share in the Allan variance at an averaging factor. Beyond the longest one that is known it falls as that of white noise
-    /// does.
+    /// Their share in the Allan variance at an averaging factor. Beyond the longest one that is known it falls as that of white noise does.
     pub(crate) fn avar(&self, n: u64) -> f64 {
         let known = self.points.iter().rev().find(|(known, _)| *known <= n);
         known.map_or(0.0, |&(known, avar)| avar * known as f64 / n as f64)
@@ -109,8 +107,7 @@ fn difference(with: &Curve<OCTAVES>, without: &Curve<OCTAVES>) -> Vec<(u64, f64)
     with.points().iter().filter_map(share).collect()
 }
 
-/// Number of events in samples that are left out, in ascending order: those of one event lie no farther apart than an interpolation
-/// reaches.
+/// Number of events in `excluded`, in ascending order: the samples of one event lie no farther apart than an interpolation reaches.
 fn events(excluded: &[u64]) -> u64 {
     let apart = excluded.windows(2).filter(|pair| pair[1] - pair[0] > REACH as u64).count();
     apart as u64 + u64::from(!excluded.is_empty())
@@ -126,8 +123,7 @@ fn energies_of_samples(samples: &[(u64, f64)]) -> Vec<f64> {
     energies
 }
 
-/// Squares of the samples that are left out, less the straight line between their neighbours that are not, summed in [`BLOCKS`] of the
-/// part.
+/// Squares of the excluded samples, less the straight line between their present neighbours, summed in [`BLOCKS`] of the part.
 fn block_energies(series: &Series, excluded: &[u64]) -> Vec<f64> {
     let length = (series.span.end - series.span.start).div_ceil(BLOCKS).max(1);
     let mut energies = vec![0.0; BLOCKS as usize];
@@ -214,8 +210,7 @@ mod tests {
         assert_eq!(events(&[100, 101, 107, 114]), 2, "seven sample periods are farther than an interpolation reaches");
     }
 
-    /// A variance of ten thousand degrees of freedom, half of which four events make: the events alone have 2/(2/4) = 4 in a share of a
-    /// half, which is 16 of the whole.
+    /// Of a variance of ten thousand degrees of freedom four events make half: they have 2/(2/4) = 4 in their half, 16 in the whole.
     #[test]
     fn the_degrees_of_freedom_are_those_of_the_noise_and_of_the_events() {
         let share = EventShare { points: vec![(1, 8.0), (4, 2.0)], count: 4, hours: 1.0, relative_variance: 0.25 };

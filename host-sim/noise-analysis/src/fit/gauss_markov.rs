@@ -1,5 +1,4 @@
-//! A Gauss-Markov process in the place of bias instability and rate random walk, for filters and simulators that know no
-//! other slow noise.
+//! A Gauss-Markov process in the place of bias instability and rate random walk, for filters and simulators that know no other slow noise.
 //!
 //! With the Allan variance `v` of the whole fitted model and `d` of its slow part, the substitute of variance `s` and
 //! correlation time `T` gives `m = v − d + s·g(T)`, `g` the Allan variance of a process of variance 1. The best one has the
@@ -13,11 +12,9 @@ use allan_core::{Model, NoiseTerm, model::FittedTerm};
 /// The slow part of a channel's fitted model at the averaging factors of its curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlowNoise {
-    /// One entry an octave.
     pub octaves: Vec<SlowOctave>,
 }
 
-/// One averaging factor of [`SlowNoise`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlowOctave {
     /// Averaging factor, samples.
@@ -48,8 +45,7 @@ const ACCURACY: f64 = 1e-6;
 /// Steps of Fisher scoring for the variance at a fixed correlation time.
 const STEPS: usize = 40;
 
-/// The Gauss-Markov process that replaces the slow part of every one of `channels`, which are sampled every `sample_period`
-/// seconds. `None` where no channel has a slow part.
+/// The process that replaces the slow part of each of `channels`, sampled every `sample_period` s; `None` where none has a slow part.
 #[must_use]
 pub fn fit(channels: &[SlowNoise], sample_period: f64) -> Option<GaussMarkovFit> {
     if !channels.iter().any(|channel| channel.octaves.iter().any(|octave| octave.slow > 0.0)) {
@@ -145,14 +141,12 @@ mod tests {
     fn a_gauss_markov_process_is_its_own_substitute() {
         for (s, time) in [(0.01, 100.0), (0.004, 20.0)] {
             let found = fit(&[octaves(|tau| gauss_markov(s, time, tau))], 0.01).expect("slow noise");
-            // The closed form is that of continuous time: at 2000 and 10,000 samples a correlation time it is off by less
-            // than 1e-3 wherever white noise does not hide it.
+            // The closed form is that of continuous time: at 2000 and more samples a correlation time it is off by less than 1e-3.
             assert!((found.time_constant / time - 1.0).abs() < 2e-3, "{found:?}");
             assert!((found.deviations[0] / s - 1.0).abs() < 2e-3 && found.worst_ratio < 1.001, "{found:?}");
         }
     }
 
-    /// The deviance of a process against a channel, by the closed form.
     fn deviance(channel: &SlowNoise, s: f64, time: f64) -> f64 {
         let of = |octave: &SlowOctave| {
             let with = octave.model - octave.slow + gauss_markov(s, time, octave.n as f64 * 0.01);
@@ -161,8 +155,7 @@ mod tests {
         channel.octaves.iter().map(of).sum()
     }
 
-    /// Flicker noise is flat over all octaves, which no Gauss-Markov process is: the substitute is the best of a grid of
-    /// processes, 1 % apart in both parameters.
+    /// Flicker noise is flat over all octaves, unlike any process: the substitute is the best of a grid, 1 % apart in both parameters.
     #[test]
     fn bias_instability_has_the_best_substitute() {
         let b = 0.01_f64;

@@ -7,11 +7,9 @@ use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
 use std::f64::consts::PI;
 
-/// Farthest that a time constant and another one, or the octave of the curve that it may belong to, are apart to be one, in octaves:
-/// either is known to a factor of 2.
+/// Farthest, in octaves, that two time constants, or one and its octave of the curve, are apart to be one: each is known to a factor of 2.
 const SAME_TIME_OCTAVES: f64 = 2.0;
 
-/// True if two time constants, s, may be those of one process.
 pub(crate) fn is_same_time(one_s: f64, other_s: f64) -> bool {
     (one_s / other_s).log2().abs() <= SAME_TIME_OCTAVES
 }
@@ -26,7 +24,6 @@ pub(crate) fn is_white(kind: &NoiseTerm) -> bool {
     is_filter(kind) || *kind == NoiseTerm::AngleRandomWalk
 }
 
-/// True if a term is a line.
 pub(crate) fn is_line(kind: &NoiseTerm) -> bool {
     line_frequency(kind).is_some()
 }
@@ -52,8 +49,7 @@ pub(crate) fn sinusoids<'a>(kinds: impl Iterator<Item = &'a NoiseTerm>) -> Vec<f
 /// Longest correlation time, in samples, of a Markov process that is white noise behind a low-pass filter of the first order.
 pub(crate) const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 
-/// N below the corner of a Markov process that stands in the place of the white noise of a channel with this `resolution`; `None` of one that
-/// does not.
+/// N below the corner of a Markov process in the place of the white noise of a channel with this `resolution`; `None` of another one.
 ///
 /// A sampled process of deviation `s` and correlation time `T` has there the two-sided density `s²·dt·coth(dt/2T)`, and
 /// `s²·dt·tanh(dt/2T)` at half the sample rate. It stands in the place of white noise if the white noise of the model is known to be above it

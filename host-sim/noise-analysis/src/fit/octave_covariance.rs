@@ -19,8 +19,7 @@ use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// Longest averaging factor whose covariance is integrated. The longest filter has 2 × 64 taps; at 512 samples the correlation of
-/// neighbours is over.
+/// Longest averaging factor that is integrated: the longest filter has 2 × 64 taps, and at 512 samples neighbours do not correlate.
 const LONGEST: u64 = 512;
 /// Change of a decimation by which the slope of the variance is taken: far above rounding, far below what bends the variance.
 const RELATIVE_STEP: f64 = 1e-3;
@@ -29,8 +28,7 @@ const STEPS: usize = 8192;
 
 /// Covariance matrix of the relative errors of the Allan variances of `points`, if `model` is the true one.
 ///
-/// Beyond 512 samples the degrees of freedom are those of the model's mixture of noises, and the correlations those of pure
-/// noises.
+/// Beyond 512 samples the degrees of freedom are those of the model's mixture of noises, and the correlations those of pure noises.
 fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMatrix<f64> {
     let period = model.sample_period();
     let step = 0.5 / period / STEPS as f64;
@@ -59,8 +57,7 @@ fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMatrix<f64> {
     })
 }
 
-/// `H_n` in the middle of each step from 0 to the Nyquist frequency. It depends on neither record nor sample rate, so that of
-/// an octave is computed once.
+/// `H_n` in the middle of each step from 0 to the Nyquist frequency, computed once: it depends on neither record nor sample rate.
 fn transfer_function(n: u64) -> Cow<'static, [f64]> {
     static OF_OCTAVES: [OnceLock<Vec<f64>>; LONGEST.ilog2() as usize + 1] =
         [const { OnceLock::new() }; LONGEST.ilog2() as usize + 1];

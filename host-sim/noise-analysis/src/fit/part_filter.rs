@@ -34,7 +34,6 @@ const BOUNDED: f64 = 0.95;
 /// From so many channels on, at least half of them must show a filter.
 const CHANNELS_FOR_MAJORITY: usize = 3;
 
-/// The filter of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PartFilter {
     /// White noise behind it.
@@ -53,9 +52,7 @@ pub(crate) struct PartFilter {
 /// Why a record does not identify the filter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Unidentified {
-    /// No inertial channel is dithered.
     NotDithered,
-    /// Neighbouring samples are not correlated.
     NotCorrelated,
     /// Only these of three channels or more are correlated.
     Minority(Vec<&'static str>),
@@ -63,8 +60,7 @@ pub(crate) enum Unidentified {
     NotSought,
 }
 
-/// The common filter of `channels`, of which the sensor may have `filters`, and `may_be_low_pass`; its clock runs at about
-/// `nominal_decimation` values per sample.
+/// The common filter of `channels`, one of `filters` or maybe a low-pass one; the clock has about `nominal_decimation` values per sample.
 pub(crate) fn estimate(
     channels: &[FilteredChannel],
     (filters, may_be_low_pass): (&[MovingAverageFilter], bool),
@@ -91,7 +87,6 @@ pub(crate) fn estimate(
         .unwrap_or_else(|| joint.averages(&averages[chosen], &tried[chosen], other_taps)))
 }
 
-/// Spectra of channels that show a filter.
 struct JointSpectra<'a> {
     spectra: &'a [ChannelSpectrum],
     /// The lowest deviance of each.
@@ -188,7 +183,6 @@ impl<'a> JointSpectra<'a> {
     }
 }
 
-/// The lesser deviance of each channel.
 fn lesser(mut deviances: Vec<f64>, others: &[f64]) -> Vec<f64> {
     deviances.iter_mut().zip(others).for_each(|(deviance, other)| *deviance = deviance.min(*other));
     deviances
@@ -199,8 +193,7 @@ fn weights(spectra: &[ChannelSpectrum], lowest: &[f64]) -> Vec<f64> {
     spectra.iter().zip(lowest).map(|(channel, lowest)| (channel.bands() / lowest).min(1.0)).collect()
 }
 
-/// Disagreement of the channels: the sum of the `rises` of their deviances over its expectation, at least 1 (R. Birge, Phys.
-/// Rev. 40, 1932).
+/// Disagreement of the channels: the sum of the `rises` of their deviances over its expectation, at least 1 (Birge, Phys. Rev. 40, 1932).
 fn birge_ratio(rises: &[f64]) -> f64 {
     (rises.iter().sum::<f64>() / (rises.len() as f64 - 1.0).max(1.0)).max(1.0)
 }
@@ -238,7 +231,6 @@ mod tests {
         estimated_from(&recorded, (&profile, rate_hz))
     }
 
-    /// Estimates the filter of three channels that were recorded at `rate_hz`.
     fn estimated_from(
         recorded: &[Vec<i32>; 3],
         (profile, rate_hz): (&SensorProfile, f64),
@@ -246,7 +238,6 @@ mod tests {
         estimated_with_losses(recorded, (profile, rate_hz), |_| false)
     }
 
-    /// The same without the samples at lost positions.
     fn estimated_with_losses(
         recorded: &[Vec<i32>; 3],
         (profile, rate_hz): (&SensorProfile, f64),
@@ -299,8 +290,7 @@ mod tests {
         })
     }
 
-    /// Six or more of eight 95 % intervals hold in 99.4 % of cases. Bartlett windows and white noise of a sensor that may have a low-pass
-    /// filter have none.
+    /// Six or more of eight 95 % intervals hold in 99.4 % of cases. Bartlett windows and white noise have no low-pass filter.
     #[test]
     fn two_stages_are_told_from_moving_averages() {
         let profile = SensorProfile::generic();

@@ -1,5 +1,4 @@
-//! White noise that entered after the filter of a sensor, or quantization: behind a filter of few taps the curve does not tell the two apart, and the
-//! spectrum does.
+//! White noise or quantization after the filter of a sensor: with few taps the spectrum tells the two apart, and the curve does not.
 
 use super::channel_fit::MAX_DEVIANCE_RISE;
 use super::sample_coefficients::{SamplesOfCurve, gain_by_samples};

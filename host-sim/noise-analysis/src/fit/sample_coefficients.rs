@@ -37,8 +37,7 @@ pub(crate) struct SamplesOfCurve<'a> {
 }
 
 impl SamplesOfCurve<'_> {
-    /// Their spectrum without lines at these frequencies in Hz; `None` where too few of the samples of `curve` are kept, or a long gap is
-    /// missing.
+    /// Their spectrum without lines at these frequencies, Hz; `None` where too few samples of `curve` are kept, or there is a long gap.
     pub(crate) fn spectrum(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
         let Self { rest, spectrum } = self;
         let samples_per_mean = (rest.sample_period() / curve.sample_period()).round();
@@ -51,8 +50,7 @@ impl SamplesOfCurve<'_> {
         }
     }
 
-    /// Welch's spectrum of them, in which long gaps are left out, without lines at these frequencies in Hz; `None` where means of the samples
-    /// alone are kept.
+    /// Their Welch spectrum, which leaves out long gaps, without lines at these frequencies, Hz; `None` where means alone are kept.
     pub(crate) fn averaged_spectrum(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
         let of = |spectrum: &Welch, interpolated: f64| {
             SampleSpectrum::of_welch(spectrum, self.rest.rounding(), lines, interpolated)
@@ -129,8 +127,7 @@ mod tests {
     /// Q of [`angle_error`], in counts times s: the deviation of the errors of the angle.
     const QUANTIZATION: f64 = DEVIATION * std::f64::consts::FRAC_1_SQRT_2 * PERIOD_S;
 
-    /// The probability of a quantization of at least `low` in white noise of [`DEVIATION`] with what `added` makes, of which one of so many
-    /// samples is missing.
+    /// Probability of a quantization of at least `low` in white noise and what is `added`; one of so many samples is missing.
     fn p_value(seed: u64, low: f64, one_of: usize, mut added: impl FnMut(&mut ChaCha8Rng) -> f64) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut values = Vec::new();
@@ -175,8 +172,7 @@ mod tests {
         assert_eq!(refuted, 20);
     }
 
-    /// Q is known to 2 % where its power is that of the noise. White noise alone shows its square, over that of this power, to 0.018: 0.16 is
-    /// nine deviations.
+    /// Q is known to 2 % where its power is that of the noise. White noise shows Q², over that power, to 0.018: 0.16 is nine deviations.
     #[test]
     fn the_spectrum_contradicts_more_quantization_than_it_shows() {
         let refuted =

@@ -40,7 +40,6 @@ struct Run {
 }
 
 impl SignalShare {
-    /// The share of the signals that a part of a recording shows.
     pub(crate) fn new(periodic: Option<&PeriodicSignal>, track: Option<&FrequencyTrack>) -> Self {
         let harmonics = |found: &PeriodicSignal| Harmonics {
             frequency: found.frequency.value,
@@ -59,7 +58,6 @@ impl SignalShare {
         self.periodic.is_none() && self.run.is_none()
     }
 
-    /// True if there is a line whose frequency runs.
     pub(crate) fn has_run(&self) -> bool {
         self.run.is_some()
     }
@@ -104,8 +102,7 @@ impl SignalShare {
         self.periodic.as_ref().map_or(0.0, of_periodic) + self.run.as_ref().map_or(0.0, of_run)
     }
 
-    /// The rest of a curve without them: at least a tenth of every point. A point keeps its measured scatter, so one that is mostly
-    /// signal says little of the noise.
+    /// The curve without them, at least a tenth of each point. Its scatter stays: a point that is mostly signal says little of the noise.
     pub(crate) fn left_of(&self, curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
         let mut left = curve.clone();
         if !self.is_empty() {
@@ -131,7 +128,6 @@ impl SignalShare {
     }
 }
 
-/// Factors from an amplitude to its bounds.
 fn bounds(amplitude: BoundedEstimate) -> [f64; 2] {
     [amplitude.low, amplitude.high].map(|bound| if amplitude.value > 0.0 { bound / amplitude.value } else { 1.0 })
 }
@@ -186,7 +182,6 @@ mod tests {
             [found, expected].iter().all(|[found, expected]| (found / expected - 1.0).abs() < 1e-9)
         };
         assert!(of(1.0, 1.0).within_bounds().any(is_near));
-        // A signal that is missing needs no steps.
         assert_eq!(SignalShare { periodic: None, ..of(1.0, 1.0) }.within_bounds().count(), 5);
     }
 

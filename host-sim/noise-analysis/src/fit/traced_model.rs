@@ -20,8 +20,7 @@ const LEAST_LEFT: f64 = 0.1;
 /// Least decrease of the deviance by a term of two parameters that a trace adds.
 pub(crate) const COST_OF_A_TERM: f64 = 18.0;
 
-/// Averaging time, in lengths of the filter, from which on the Allan variance of white noise behind it is that of white noise within a
-/// percent or two.
+/// Averaging time, in lengths of the filter, from which on filtered white noise has the Allan variance of white noise within 1 % or 2 %.
 const LONG_AGAINST_FILTER: f64 = 8.0;
 /// Fewest degrees of freedom for which the bounds of a point of a curve are derived.
 const LEAST_EDF: f64 = 3.0;
@@ -45,11 +44,9 @@ pub(crate) type PlannedTerm = (NoiseTerm, Option<Addition>);
 /// Which shapes of the terms a fit searches for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Shapes {
-    /// None.
     Kept,
     /// All but frequencies of sinusoids and filters.
     OfProcesses,
-    /// All but filters.
     AllButFilters,
 }
 
@@ -57,7 +54,6 @@ pub(crate) enum Shapes {
 #[derive(Debug, Clone)]
 pub(crate) struct TracedModel {
     model: Model,
-    /// The origin of each term of the model.
     additions: Vec<Option<Addition>>,
     pub goodness: Goodness,
     /// Bounds of the adjusted shape of the filter that all channels have: its decimation, or its frequency.
@@ -65,7 +61,6 @@ pub(crate) struct TracedModel {
 }
 
 impl TracedModel {
-    /// The model of a trace of `curve`.
     pub(crate) fn new(trace: &Trace, curve: &Curve<OCTAVES>) -> Self {
         let mut additions = vec![None; trace.after.terms().len()];
         for (rank, found) in (0..).zip(&trace.added) {
@@ -88,12 +83,10 @@ impl TracedModel {
         Self { goodness: goodness(curve, &model), model: within_measured(&model, curve), additions, of_filter: None }
     }
 
-    /// The model itself.
     pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The terms with what added them.
     pub(crate) fn terms(&self) -> impl DoubleEndedIterator<Item = PlannedTerm> + Clone {
         self.model.terms().iter().map(|term| term.kind).zip(self.additions.iter().copied())
     }
@@ -106,7 +99,6 @@ impl TracedModel {
             .collect()
     }
 
-    /// Positions of these.
     pub(crate) fn added_at(&self) -> Vec<usize> {
         let rank = |at: &usize| self.additions[*at].map(|addition| addition.rank);
         let mut added: Vec<usize> = (0..self.additions.len()).filter(|at| self.additions[*at].is_some()).collect();
@@ -114,12 +106,10 @@ impl TracedModel {
         added
     }
 
-    /// True if it has a filter.
     pub(crate) fn has_filter(&self) -> bool {
         self.model.terms().iter().any(|term| is_filter(&term.kind))
     }
 
-    /// True if another term has room.
     pub(crate) fn has_room(&self) -> bool {
         self.model.terms().len() < MAX_TERMS
     }
@@ -262,7 +252,6 @@ fn share(line: &FittedTerm, point: &AllanPoint, period_s: f64) -> f64 {
     line.value * line.value * line.kind.avar(point.n, period_s)
 }
 
-/// The rest of `curve` without `lines`.
 fn left_by(lines: &[FittedTerm], curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
     let mut others = curve.clone();
     let shares = |point: &AllanPoint| lines.iter().map(|line| share(line, point, curve.sample_period())).sum::<f64>();

@@ -43,8 +43,7 @@ pub(crate) struct Epochs {
 }
 
 impl FirstHalf {
-    /// Prepares the models of the `half` for what follows it in the `whole` record, and tells how the noise changes; `estimators` are
-    /// those of the halves.
+    /// Prepares the models of the `half` for the rest of the `whole`, and tells how the noise changes; `estimators` are of both halves.
     pub(crate) fn new(
         whole: &PreprocessedRecord,
         half: &PreprocessedRecord,
@@ -152,8 +151,7 @@ impl FirstHalf {
         }
     }
 
-    /// The error on the second half of the curve of the first half itself, both as they were recorded but for the bias that the first half
-    /// foretells.
+    /// The error on the second half of the curve of the first, both as recorded but for the bias that the first half foretells.
     fn curve_error(&self, halves: &HalfEstimators, channel: ChannelId) -> ModelErrorReport {
         let fit = &self.part.channels[channel].fit;
         let [first, second] = [0, 1].map(|half| fit.covariates.compensated(&halves.foretold[half], channel));
@@ -226,12 +224,10 @@ impl FirstHalf {
 }
 
 impl Epochs {
-    /// The series of a channel in both halves, by what the first half shows.
     pub(crate) fn series(&self, channel: ChannelId) -> &Series {
         &self.series[channel]
     }
 
-    /// Follows the noise of each traced channel.
     pub(crate) fn nonstationarities(
         &self,
         record: &PreprocessedRecord,
@@ -256,7 +252,6 @@ impl Epochs {
     }
 }
 
-/// The terms of a model of a channel of a part of the record.
 fn terms_of(model: &Model, part: &RecordPart, channel: ChannelId) -> Vec<TermReport> {
     term_reports(model, part.channels[channel].unit, part.resolution(channel))
 }

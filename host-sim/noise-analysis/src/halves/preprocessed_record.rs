@@ -58,7 +58,6 @@ impl<'a> PreprocessedRecord<'a> {
         Self { record, preprocessing, estimators, series, motions }
     }
 
-    /// The models of the record.
     pub(crate) fn fit(&self) -> TracedPart {
         let measurement = self.measurement();
         let biases = measurement.ids().map(|channel| self.bias(channel)).collect();
@@ -67,7 +66,6 @@ impl<'a> PreprocessedRecord<'a> {
         TracedPart::fit(&data)
     }
 
-    /// The findings in the block means of a channel.
     pub(crate) fn bias(&self, channel: ChannelId) -> BiasByBlocks {
         BiasByBlocks {
             has_ramp: self.preprocessing.has_ramp(channel),

@@ -33,7 +33,6 @@ use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use measurement::{ChannelId, PerChannel, SensorProfile};
 
-/// The data that a part of a recording is fitted from.
 pub(crate) struct PartData<'a> {
     pub profile: &'a SensorProfile,
     pub curves: &'a RecordPart,
@@ -41,11 +40,9 @@ pub(crate) struct PartData<'a> {
     pub samples: Option<PartSamples<'a>>,
 }
 
-/// The samples of a part of a recording.
 pub(crate) struct PartSamples<'a> {
     pub record: &'a CondensedRecord<'a>,
     pub series: &'a PerChannel<Series>,
-    /// Findings in the block means of each channel.
     pub biases: PerChannel<BiasByBlocks>,
 }
 
@@ -57,25 +54,20 @@ pub(crate) struct BiasByBlocks {
     pub sensitivities: Vec<(ChannelId, BiasSensitivity)>,
 }
 
-/// A part of a recording with its models.
 pub(crate) struct TracedPart {
     pub channels: PerChannel<ChannelTrace>,
-    /// The filter that the sensor has, by this part.
     pub filter: Result<PartFilter, Unidentified>,
 }
 
 /// The noise of one channel in one part of a recording.
 pub(crate) struct ChannelTrace {
     pub fit: ChannelFit,
-    /// Lines in the spectrum.
     pub lines: Vec<MergedLine>,
     /// The samples less the share of the covariates; `None` where they were not used.
     pub rest: Option<UniformSeries>,
     /// The same less the periodic signal, where there is one.
     noise: Option<UniformSeries>,
-    /// Random telegraph noise.
     pub telegraph: Option<TelegraphNoise>,
-    /// Signals in the samples.
     pub signals: Vec<Signal>,
     slowest: Option<CosineSpectrum>,
     /// The spectrum of the samples where their means alone are kept.
@@ -83,7 +75,6 @@ pub(crate) struct ChannelTrace {
 }
 
 impl BiasByBlocks {
-    /// The sensitivity to a channel.
     pub(crate) fn sensitivity(&self, regressor: ChannelId) -> Option<BiasSensitivity> {
         self.sensitivities.iter().find(|(to, _)| *to == regressor).map(|(_, sensitivity)| *sensitivity)
     }
@@ -147,8 +138,7 @@ impl TracedPart {
         }
     }
 
-    /// The proposals of a channel's model, and the part of the curve that they leave unexplained; `common` is the drift that the channel
-    /// has in common with others.
+    /// Proposals of a channel's model, and the part of the curve that they leave unexplained; `common` is the drift shared with others.
     pub(crate) fn proposals(
         &self,
         profile: &SensorProfile,

@@ -1,7 +1,6 @@
 //! Common-mode drift: the part of each channel that the others explain, and the hold-out gain of subtracting it.
 //!
-//! Each channel is regressed on all others by the Allan covariances of the first half at one octave; the weights are
-//! applied to the second half at all octaves.
+//! Each channel is regressed on all others by the Allan covariances of the first half at one octave; the weights hold for the second half.
 
 use crate::parallel::in_parallel;
 use crate::record::estimators::CoupledEstimators;
@@ -40,8 +39,7 @@ pub struct CommonModeRegression {
     pub channels: Vec<String>,
     /// Averaging time at which the weights were estimated, s: the longest one with enough degrees of freedom.
     pub weights_tau_s: f64,
-    /// By channel: true if the weights of the first quarter reduce the variance of the second quarter at
-    /// `weights_tau_s`. Only then are they used.
+    /// By channel: true if weights of the first quarter reduce the second quarter's variance at `weights_tau_s`; else they are not used.
     pub trusted: Vec<bool>,
     /// Octave by octave, in the first half.
     pub shares: Vec<OctaveShares>,

@@ -59,8 +59,7 @@ impl EpochCurves {
         self.unseen_epochs.iter().all(changes)
     }
 
-    /// The same curves of a channel by averaging factors in samples, where the series has means, with those of the samples at `shorter`
-    /// averaging times.
+    /// The same curves by averaging factors in samples, where the series has means, with those of the samples at `shorter` averaging times.
     pub(crate) fn in_samples(self, shorter: &SampleCurves) -> Self {
         let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
             let of_samples = shorter.within(slots, Exclusion::ByFirstHalf);
@@ -207,8 +206,7 @@ pub enum FittedPart {
 }
 
 impl Stationarity {
-    /// Compares two stretches octave by octave, up to an eighth of the shorter one. `None` if no octave can be
-    /// compared.
+    /// Compares two stretches octave by octave, up to an eighth of the shorter one. `None` if no octave can be compared.
     ///
     /// The ratio of two variances has Fisher's distribution, with degrees of freedom by `model`. The p-value of the
     /// clearest octave is multiplied by the number of octaves (Bonferroni).
@@ -231,7 +229,6 @@ impl Stationarity {
         Some(Self { p_value: (clearest.p_value * octaves.len() as f64).min(1.0), ..*clearest })
     }
 
-    /// True if the stretches have different noise.
     #[must_use]
     pub fn is_nonstationary(&self) -> bool {
         self.p_value < SIGNIFICANCE

@@ -1,8 +1,7 @@
 //! Prediction of the second half with tracked parameters, epoch by epoch, and its baselines.
 //!
-//! Only parameters that changed in the first half are tracked, each epoch predicted from those before it. The pooled
-//! error is too small, because the mean of lagging predictions is nearly that of the parameters; the one-step error is
-//! not.
+//! Only parameters that changed in the first half are tracked, each epoch predicted from those before it. The pooled error is too small,
+//! because the mean of lagging predictions is nearly that of the parameters; the one-step error is not.
 
 use super::epochs::{ComparedCurve, EpochCurves, MIN_AVERAGES, SIGNIFICANCE};
 use super::tracked_parameters::{MAX_LEVEL, PARAMETERS, ParameterVector, TrackedModel, TrackedSet, minimum};
@@ -98,8 +97,7 @@ fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
 /// Standard deviation of the difference between each parameter's mean over `unseen` epochs and its mean over the last
 /// `used` epochs of the first half, if the parameter goes on as a random walk with the steps of the first half.
 ///
-/// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about
-/// `q·(L + H)/3`.
+/// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about `q·(L + H)/3`.
 pub(crate) fn expected_drift(
     model: &TrackedModel,
     tracked: TrackedSet,

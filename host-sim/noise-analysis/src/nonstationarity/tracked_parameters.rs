@@ -44,7 +44,6 @@ pub(crate) struct EpochEstimate {
     scatter: f64,
 }
 
-/// The parameters that are tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TrackedSet {
@@ -63,7 +62,6 @@ pub(crate) struct MovementTest {
 }
 
 impl TrackedModel {
-    /// A model none of whose lines is tracked.
     pub(crate) fn without_line(model: Model) -> Self {
         Self { model, line: None }
     }
@@ -108,7 +106,6 @@ impl TrackedModel {
         }
     }
 
-    /// All parameters that can be tracked.
     pub(crate) fn largest_set(&self) -> TrackedSet {
         if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }

@@ -1,5 +1,4 @@
-//! A recording as it is analysed: means of consecutive samples, and findings about the samples themselves. A short
-//! recording has one sample per mean.
+//! A recording as it is analysed: means of consecutive samples, of one each if it is short, and findings about the samples themselves.
 
 use crate::detectors::stuck_output;
 use crate::effects::Effect;
@@ -14,7 +13,6 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
-/// A recording, condensed.
 pub struct CondensedRecord<'a> {
     pub(crate) description: RecordingDescription,
     /// Means of [`samples_per_mean`](Self::samples_per_mean) samples each.
@@ -45,8 +43,7 @@ pub(crate) struct CondensedChannel {
     /// Effects that only the samples themselves show, in an inertial channel.
     pub effects: Vec<Effect>,
     pub effects_of_first_half: Vec<Effect>,
-    /// Spikes and knocks of the first half that are left out of the means: sample period and distance from its
-    /// neighbours, in the channel's unit.
+    /// Spikes and knocks of the first half that the means leave out: sample period, and distance from the neighbours in the channel's unit.
     pub screened: Vec<(u64, f64)>,
     /// Refused samples of this channel alone, by cause.
     pub refused: BTreeMap<&'static str, u64>,

@@ -1,5 +1,4 @@
-//! A recording that is too long for memory: means of consecutive samples, 2¹⁷ at most, curves at shorter averaging
-//! times, and the first samples.
+//! A recording that is too long for memory: at most 2¹⁷ means of consecutive samples, curves at shorter times, and the first samples.
 //!
 //! ```text
 //! first samples ─► SampleEffects: resolution, repeated samples, sample clock
@@ -11,8 +10,7 @@
 //!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
 //! ```
 //!
-//! Second differences of means are those of the samples at longer averaging times, so both curves of a channel join.
-//! Memory does not grow with the recording.
+//! Second differences of means are those of the samples at longer averaging times, so both curves join. Memory does not grow.
 
 use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
@@ -58,7 +56,6 @@ const LEAST_FILL: f64 = 0.5;
 const MEANS_PER_PERIOD: f64 = 2.5;
 const MISSING: i32 = i32::MIN;
 
-/// Reads a long recording block by block.
 pub struct LongRecordReader {
     description: RecordingDescription,
     first: Measurement,
@@ -75,7 +72,6 @@ pub struct LongRecordReader {
     gaps: usize,
 }
 
-/// Findings in the channels when the first half was read.
 #[derive(Default)]
 struct FirstHalfFindings {
     stuck: Vec<StuckRuns>,
@@ -278,7 +274,6 @@ impl LongRecordReader {
         });
     }
 
-    /// The condensed recording.
     #[must_use]
     pub fn finish(mut self) -> CondensedRecord<'static> {
         if self.first_half.is_none() {
@@ -455,7 +450,6 @@ impl Means {
         }
     }
 
-    /// Ends all means before `number`.
     fn end_before(&mut self, number: u64) {
         let number = number.min(self.most);
         while (self.counts.len() as u64) < number {

@@ -1,8 +1,7 @@
 //! Preprocessing: the findings of the detectors in each channel, and the series without them.
 //!
-//! Repeated samples become gaps of every channel, knocks and spikes gaps of their own; steps and responses to vibration
-//! or temperature are subtracted. Ramps stay in the samples (a noise term), and so do sensitivities to temperature or
-//! supply (covariate regression).
+//! Repeated samples become gaps of every channel, knocks and spikes gaps of their own; steps and responses to vibration or temperature are
+//! subtracted. Ramps stay in the samples (a noise term), and so do sensitivities to temperature or supply (covariate regression).
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
@@ -43,7 +42,6 @@ struct EventRules {
 }
 
 struct Shown {
-    /// Counts of the smallest step of each channel.
     counts_per_step: PerChannel<u32>,
     repeated: Vec<u64>,
     channels: PerChannel<ShownInChannel>,
@@ -96,7 +94,6 @@ impl Preprocessing {
         shown.map(|shown| shown.channels[channel].events()).unwrap_or_default()
     }
 
-    /// True if two exclusions leave a channel the same series.
     pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
         let subtracted = |exclusion| {
             let bias = self.bias(channel, exclusion);
@@ -347,14 +344,12 @@ fn of_inertial(measurement: &Measurement, found: Vec<LoudStretches>) -> PerChann
     loud
 }
 
-/// The forces that the gyroscopes may follow.
 fn forces(measurement: &Measurement, quiet: &PerChannel<Series>) -> Forces {
     let has_rates = measurement.of_quantity(Quantity::AngularRate).next().is_some();
     let forces = measurement.of_quantity(Quantity::SpecificForce).filter(|_| has_rates).map(|of| &quiet[of]);
     Forces::new(&forces.collect::<Vec<&Series>>())
 }
 
-/// The accelerometers that may shake `channel`.
 fn accelerations<'s>(
     record: &'s CondensedRecord,
     series: &'s PerChannel<Series>,

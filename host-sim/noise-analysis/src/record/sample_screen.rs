@@ -12,7 +12,6 @@ use std::ops::Range;
 /// Samples examined together, around whose mean a spike stands out.
 const TOGETHER: usize = 1 << 16;
 
-/// Marks spikes, short knocks and repeated samples.
 pub(crate) struct SampleScreen {
     /// Per channel, the rule for its spikes, if they are sought.
     rules: Vec<Option<SpikeRule>>,
@@ -31,8 +30,7 @@ impl SampleScreen {
         Self { rules, found, leaves_out_repeated, held, settled: 0 }
     }
 
-    /// Takes the next samples; passes on those whose neighbours are known, with spikes, knocks and repeated ones
-    /// refused.
+    /// Takes the next samples; passes on those whose neighbours are known, with spikes, knocks and repeated ones refused.
     pub(crate) fn push(&mut self, block: &SampleBlock, mut pass: impl FnMut(&SampleBlock)) {
         let mut from = 0;
         while from < block.slots.len() {

@@ -36,8 +36,7 @@ pub(crate) fn lost_samples_of(measurement: &Measurement) -> Option<Detection> {
     lost_samples(measurement.len() as u64, &measurement.dropped, measurement.gaps())
 }
 
-/// Samples that never arrived, beside the `used` ones: the sample indices or time stamps have room for them. A single one is
-/// reported, because only a loss leaves such room.
+/// Samples beside the `used` ones for which indices or time stamps have room. A single one is reported: only a loss leaves room.
 pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gaps: usize) -> Option<Detection> {
     let missing = dropped.get("gap").copied().unwrap_or(0);
     if missing == 0 {

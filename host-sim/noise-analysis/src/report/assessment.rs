@@ -32,7 +32,6 @@ pub struct Assessment {
     pub coefficients: Vec<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients_note: Option<String>,
-    /// The data that the model was fitted to.
     pub coefficients_from: CoefficientsFrom,
     /// Error of the integrated channel without aiding.
     pub drift: Vec<NavigationDrift>,
@@ -53,13 +52,11 @@ pub struct Coefficient {
     pub value: Parameter,
 }
 
-/// Root mean square error of an angular rate or an acceleration that is integrated; its bias is estimated as the mean of
-/// [`CALIBRATION_S`] before.
+/// Root mean square error of an integrated rate or acceleration, whose bias is estimated as the mean of [`CALIBRATION_S`] before.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NavigationDrift {
     /// Time of integration, s.
     pub seconds: f64,
-    /// Time over which the bias is estimated, s.
     pub calibration_s: f64,
     /// By the model, in `unit`.
     pub predicted: f64,
@@ -79,12 +76,10 @@ pub struct RecordLength {
     pub more_hours: Option<f64>,
 }
 
-/// The models of a channel that are assessed.
 #[derive(Debug, Clone, Copy)]
 pub struct AssessedModels<'a> {
     /// Fitted to the whole record: the model that people use.
     pub refitted: &'a Model,
-    /// The data that its coefficients are fitted to.
     pub coefficients_from: CoefficientsFrom,
     /// As `refitted`, with the share of the covariates, which the samples still have.
     pub uncompensated: &'a Model,
@@ -93,8 +88,7 @@ pub struct AssessedModels<'a> {
 }
 
 impl Assessment {
-    /// Assesses the models of the channel whose samples, or means of them, are `series`; those of the second half with what the first half's
-    /// model foretells are `unseen`.
+    /// Assesses the models of a channel by a `series` of samples or means; `unseen` has the second half with what the first foretells.
     #[must_use]
     pub fn new(series: &Series, unseen: &Series, models: AssessedModels) -> Self {
         let AssessedModels { refitted, coefficients_from, uncompensated, of_first_half } = models;
@@ -254,8 +248,7 @@ fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<NavigationDri
     integrated_errors(model, unseen).into_iter().map(of).collect()
 }
 
-/// The record length that each coefficient of `model` needs, which was fitted to `duration` s. Of the white noise behind a
-/// filter and that after it, the larger one stands for N.
+/// Record lengths for the coefficients of `model`, fitted to `duration` s. Of white noise behind a filter and after it, the larger is N.
 fn record_lengths(model: &Model, duration: f64) -> Vec<RecordLength> {
     let largest = model.terms().iter().filter(|term| is_white(&term.kind)).map(|term| term.value).fold(0.0, f64::max);
     let is_smaller = |term: &FittedTerm| is_white(&term.kind) && term.value < largest;

@@ -12,9 +12,7 @@ pub const COMPARISON_SIGNIFICANCE: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Less noise.
     Better,
-    /// More noise.
     Worse,
     /// The intervals do not tell.
     NotDistinguishable,
@@ -36,8 +34,7 @@ pub fn difference_p_value(one: &BoundedEstimate, other: &BoundedEstimate) -> f64
     2.0 * upper_tail(difference / deviation)
 }
 
-/// The verdict on each second estimate against its first, with the p-value of their difference: the level of
-/// [`COMPARISON_SIGNIFICANCE`] holds for all pairs together.
+/// The verdict on each second estimate, with the p-value of the difference: [`COMPARISON_SIGNIFICANCE`] holds for all pairs together.
 #[must_use]
 pub fn verdicts(pairs: &[(BoundedEstimate, BoundedEstimate)]) -> Vec<(Verdict, f64)> {
     let p_values: Vec<f64> = pairs.iter().map(|(one, other)| difference_p_value(one, other)).collect();

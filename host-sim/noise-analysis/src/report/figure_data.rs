@@ -1,5 +1,4 @@
-//! Data of the figures beside the Allan deviation: the data sheet's values, the measured spectrum and the bias over time,
-//! condensed to at most [`MOST_POINTS`] points each.
+//! Data of the figures beside the Allan deviation, at most [`MOST_POINTS`] points each: data sheet, measured spectrum, bias over time.
 
 use crate::distributions::chi_squared_quantile;
 use crate::effects::BiasBlocks;

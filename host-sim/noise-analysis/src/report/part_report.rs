@@ -9,8 +9,7 @@ use allan_core::NoiseTerm;
 use allan_core::term::MovingAverageFilter;
 use measurement::Measurement;
 
-/// The report on the filter that the inertial channels of a recording have in common; `measurement` has its first samples, or all of
-/// them.
+/// The report on the filter that the inertial channels of a recording have in common; `measurement` has its first samples, or all of them.
 pub(crate) fn report(measurement: &Measurement, common: &Result<PartFilter, Unidentified>) -> PartReport {
     let name = measurement.profile.name.to_owned();
     match common {
@@ -83,7 +82,6 @@ fn contradictions(common: &PartFilter) -> impl Iterator<Item = PartNote> {
     alone.chain((showing < able).then_some(PartNote::NotInAll { showing, able }))
 }
 
-/// Why no filter is identified.
 fn reason(measurement: &Measurement, unidentified: &Unidentified) -> PartNote {
     match unidentified {
         Unidentified::NotDithered => PartNote::CountsTooCoarse,

@@ -1,18 +1,16 @@
 //! Several recordings of one sensor: whether they show the same noise, the model of all of them, and how much more noise a
 //! running machine makes than a still one.
 //!
-//! **Same noise.** At one averaging time, k recordings give Allan variances `v_i` with `ν_i` degrees of freedom. If the true
-//! variances are equal, Bartlett's statistic `T = (Σν·ln v̄ − Σ ν_i ln v_i)/C`, `v̄ = Σ ν_i v_i/Σν`,
-//! `C = 1 + (Σ 1/ν_i − 1/Σν)/(3(k−1))`, is the likelihood ratio and follows χ² with k−1 degrees of freedom (M. Bartlett, Proc. R.
-//! Soc. A 160, 1937). Octaves share samples: with a correlation ρ of two octaves' variances their statistics, sums of k−1
-//! squares each, have the covariance `2(k−1)ρ²`. The sum over the octaves is compared with a scaled χ² of the same mean and
-//! variance (F. Satterthwaite, Biometrics 2, 1946).
+//! **Same noise.** At one averaging time, k recordings give Allan variances `v_i` with `ν_i` degrees of freedom. If the true variances are
+//! equal, Bartlett's statistic `T = (Σν·ln v̄ − Σ ν_i ln v_i)/C`, `v̄ = Σ ν_i v_i/Σν`, `C = 1 + (Σ 1/ν_i − 1/Σν)/(3(k−1))`, is the
+//! likelihood ratio and follows χ² with k−1 degrees of freedom (M. Bartlett, Proc. R. Soc. A 160, 1937). Octaves share samples: with a
+//! correlation ρ of two octaves' variances their statistics, sums of k−1 squares each, have the covariance `2(k−1)ρ²`. The sum over the
+//! octaves is compared with a scaled χ² of the same mean and variance (F. Satterthwaite, Biometrics 2, 1946).
 //!
 //! **Inflation.** Of a running and a still recording, `v_r/v_s` divided by the ratio of the true variances follows F with
 //! `ν_r` and `ν_s` degrees of freedom, which gives the interval of the ratio.
 //!
-//! Differences with an excess kurtosis κ have a mean square whose variance is `(2 + κ)/2` times as large; the degrees of
-//! freedom are divided by that.
+//! With an excess kurtosis κ of differences their mean square has `(2 + κ)/2` times the variance, which divides the degrees of freedom.
 
 use crate::distributions::chi_squared_tail;
 use crate::report::TermReport;
@@ -30,8 +28,7 @@ use std::borrow::Borrow;
 const LEAST_EDF: f64 = 5.0;
 /// Probability that recordings of the same noise in all channels are said to differ in one.
 pub const DIFFERENCE_SIGNIFICANCE: f64 = 0.01;
-/// Largest relative difference of two sample rates: the octaves are numbers of samples, and σ² of white noise changes by as
-/// much as the rate.
+/// Largest relative difference of two sample rates: octaves are numbers of samples, and σ² of white noise changes as much as the rate.
 const RATE_TOLERANCE: f64 = 0.002;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -266,7 +263,6 @@ fn octaves_of(curves: &[Curve<OCTAVES>]) -> Vec<Vec<AllanPoint>> {
     first.points().iter().filter_map(of).collect()
 }
 
-/// Bartlett's statistic of the Allan variances of several recordings at one averaging time.
 fn bartlett(points: &[AllanPoint]) -> f64 {
     let weighted: Vec<(f64, f64)> = points.iter().map(|point| (degrees_of_freedom(point), point.avar)).collect();
     let total: f64 = weighted.iter().map(|(edf, _)| edf).sum();
@@ -276,8 +272,7 @@ fn bartlett(points: &[AllanPoint]) -> f64 {
     statistic / (1.0 + (inverse - 1.0 / total) / (3.0 * (points.len() as f64 - 1.0)))
 }
 
-/// Probability that the sum of the statistics of all octaves is at least as large; each is χ² with `freedom` degrees of
-/// freedom.
+/// Probability that the sum of the statistics of all octaves is at least as large; each is χ² with `freedom` degrees of freedom.
 fn p_value_of_sum(statistics: &[(u64, f64)], freedom: f64, model: &Model) -> Option<f64> {
     if statistics.is_empty() || freedom <= 0.0 {
         return None;
@@ -328,8 +323,7 @@ fn octave_inflation(still: &AllanPoint, running: &AllanPoint) -> Option<OctaveIn
 /// Quantile of the F distribution with `above` and `below` degrees of freedom at the normal deviate `z`: the cube root of
 /// χ²/ν is nearly normal with mean `1 − 2/(9ν)` and variance `2/(9ν)` (E. Paulson, Ann. Math. Stat. 13, 1942).
 ///
-/// Unlike the incomplete beta function it holds for millions of degrees of freedom. From five on it is within 4 % of the
-/// exact 95 % quantiles, 2 % of a deviation.
+/// Unlike the incomplete beta function it holds for millions of degrees of freedom. From five on it is within 4 % of exact 95 % quantiles.
 fn f_quantile(z: f64, above: f64, below: f64) -> f64 {
     let (a, b) = (2.0 / (9.0 * above), 2.0 / (9.0 * below));
     // ((1 − b)·x − (1 − a))² = z²·(b·x² + a) for x = F^⅓, the root on the side of z.
@@ -369,8 +363,7 @@ mod tests {
         assert!((found / (1.96 * 3e-6_f64.sqrt()) - 1.0).abs() < 1e-3, "{found}");
     }
 
-    /// The example of NIST's e-Handbook, section 1.3.5.7 (ten batches of ten gears): T = 20.78586, and 0.0136 for χ² with nine
-    /// degrees of freedom.
+    /// NIST's e-Handbook, section 1.3.5.7 (ten batches of ten gears): T = 20.78586, and 0.0136 for χ² with nine degrees of freedom.
     #[test]
     fn bartletts_statistic_is_that_of_the_handbook() {
         // Standard deviations of the ten batches, GEAR.DAT.

@@ -3,7 +3,6 @@
 use crate::bounds::BoundedEstimate;
 use crate::effects::Effect;
 
-/// The part of one channel in a cause.
 pub(super) struct Shown {
     /// Position of the channel in the report.
     pub channel: usize,

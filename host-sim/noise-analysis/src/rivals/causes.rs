@@ -84,7 +84,6 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
     causes
 }
 
-/// A cause as it is reported.
 fn finding(cause: &Cause, channels: &[ChannelReport], half: &[Cause], profile: &SensorProfile) -> Finding {
     let clearest = cause.clearest();
     let name = |shown: &Shown| channels[shown.channel].name.clone();
@@ -103,7 +102,6 @@ fn finding(cause: &Cause, channels: &[ChannelReport], half: &[Cause], profile: &
     }
 }
 
-/// Compares what the whole record shows of a cause with what the first half alone shows.
 fn validate(cause: &Cause, half: &[Cause]) -> Validation {
     let in_half = |shown: &Shown| {
         let of_channel = half.iter().flat_map(|cause| &cause.shown).filter(|other| other.channel == shown.channel);

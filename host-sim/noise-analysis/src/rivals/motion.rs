@@ -21,7 +21,6 @@ use crate::samples::series::Series;
 use measurement::{ChannelId, ChannelProfile, PerChannel, Quantity};
 use std::ops::Range;
 
-/// Length of a mean, s.
 const BLOCK_S: f64 = 1.0;
 /// Distance from the median from which a channel is moved, in initial bias errors.
 const BIAS_ERRORS: f64 = 3.0;
@@ -30,7 +29,6 @@ const AROUND: usize = 2;
 /// Seconds within which a sudden motion begins.
 const BEGINS_WITHIN: usize = AROUND + 1;
 
-/// The motion of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlatformMotion {
     quantity: Quantity,
@@ -38,11 +36,9 @@ pub(crate) struct PlatformMotion {
     seconds: Vec<Range<usize>>,
     /// True if the channel changes faster than a Gaussian process would.
     pub is_sudden: bool,
-    /// As reported.
     pub effect: MotionInterval,
 }
 
-/// The motion that a channel shows, if any.
 pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<PlatformMotion> {
     let width = (BLOCK_S / series.period_s).round().max(1.0) as u64;
     let sums = series.sums_of_blocks(0, width).into_iter();
@@ -119,7 +115,6 @@ impl PlatformMotion {
         self.quantity == other.quantity && self.overlaps(other)
     }
 
-    /// True if both are moved in the same seconds.
     fn overlaps(&self, other: &Self) -> bool {
         let is_in = |range: &Range<usize>| other.seconds.iter().any(|of| of.start < range.end && range.start < of.end);
         self.seconds.iter().any(is_in)

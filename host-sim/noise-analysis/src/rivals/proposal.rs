@@ -6,14 +6,12 @@ use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
 use allan_core::NoiseTerm;
 
-/// An effect that a detector or a fit proposes.
 #[derive(Debug, Clone)]
 pub(crate) struct Proposal {
     pub effect: Effect,
     pub origin: Origin,
 }
 
-/// The source that proposes an effect.
 #[derive(Debug, Clone)]
 pub(crate) enum Origin {
     /// The samples: repeated ones, knocks, spikes, steps, ramps, responses.
@@ -25,7 +23,6 @@ pub(crate) enum Origin {
         /// True if they change faster than a Gaussian process would.
         is_sudden: bool,
     },
-    /// The regression on a covariate.
     Covariate {
         /// True if the sensitivity is within what is known of the sensor.
         is_plausible: bool,
@@ -41,16 +38,13 @@ pub(crate) enum Origin {
         /// True if the samples change upwards as they change downwards.
         is_reversible: bool,
     },
-    /// The spectra of several channels.
     CrossSpectra,
-    /// A line of the spectrum.
     Line {
         /// True if it has a few periods in the record.
         is_slow: bool,
     },
     /// The rest of the curve without the model.
     Residual,
-    /// A signal in the samples.
     Signal(Signal),
     /// The level of the noise in blocks.
     Level,
@@ -61,14 +55,11 @@ pub(crate) enum Origin {
 pub(crate) enum Signal {
     /// A slow periodic one that is no sinusoid.
     Periodic(PeriodicSignal),
-    /// A line whose frequency runs.
     Chirp(FrequencyTrack),
-    /// Disturbances that begin at once and decay.
     Decays(DecayingDisturbances),
 }
 
 impl Signal {
-    /// The disturbances that decay.
     pub(crate) const fn decays(&self) -> Option<&DecayingDisturbances> {
         if let Self::Decays(of) = self { Some(of) } else { None }
     }
@@ -93,9 +84,7 @@ impl Proposal {
 pub(crate) struct ChannelFacts {
     /// Smallest distance of two values, in the channel's unit.
     pub resolution: f64,
-    /// s
     pub period_s: f64,
-    /// s
     pub duration_s: f64,
     /// Allan variance of neighbouring samples.
     pub avar: f64,

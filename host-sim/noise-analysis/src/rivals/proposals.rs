@@ -43,10 +43,8 @@ const WIDEST_BAND: f64 = 2.0;
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
 const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
 
-/// Findings in a channel over the whole record.
 pub(crate) struct ChannelFindings<'a> {
     pub channel: ChannelProfile,
-    /// Smallest distance of two values, in the channel's unit.
     pub resolution: f64,
     pub fit: &'a ChannelFit,
     /// The covariates and the channel's sensitivities to them.
@@ -55,7 +53,6 @@ pub(crate) struct ChannelFindings<'a> {
     pub lines: Option<&'a [MergedLine]>,
     /// Random telegraph noise in the samples.
     pub telegraph: Option<&'a TelegraphNoise>,
-    /// Drift that the channel has in common with others.
     pub common: Option<&'a ChannelsInCommon>,
     /// The samples less the share of the covariates.
     pub rest: Option<&'a UniformSeries>,
@@ -94,7 +91,6 @@ pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (V
     (proposals, facts)
 }
 
-/// The effects that a term of the model may be.
 fn term_effects(
     profile: &SensorProfile,
     findings: &ChannelFindings,
@@ -144,7 +140,6 @@ fn term_effects(
     effects
 }
 
-/// The effects that a Markov term of the model may be.
 fn markov_effects(
     findings: &ChannelFindings,
     facts: &ChannelFacts,
@@ -246,7 +241,6 @@ fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     markov.time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding
 }
 
-/// Evidence of an added term in the curve.
 fn curve_evidence(found: &Addition, period_s: f64) -> CurveEvidence {
     let residual = found.residual;
     CurveEvidence {
@@ -257,7 +251,6 @@ fn curve_evidence(found: &Addition, period_s: f64) -> CurveEvidence {
     }
 }
 
-/// The coefficient of a term of a channel in `unit`.
 fn coefficient(term: &FittedTerm, unit: &'static str) -> ChannelEstimate {
     BoundedEstimate::new(term.value, term.low, term.high).in_unit(unit)
 }
@@ -327,7 +320,6 @@ fn low_pass_effect(term: &FittedTerm, markov: Markov, curve: CurveEvidence) -> E
     .into()
 }
 
-/// White noise behind a low-pass filter of the second order.
 fn second_order_effect(term: &FittedTerm, filter: &LowPass, curve: CurveEvidence) -> Effect {
     LowPassFilter {
         bandwidth_hz: shape(term, 0).scaled(filter.bandwidth() / filter.frequency),
@@ -341,14 +333,12 @@ fn second_order_effect(term: &FittedTerm, filter: &LowPass, curve: CurveEvidence
     .into()
 }
 
-/// A sensitivity with its bounds, of a channel in `unit`.
 fn bounded(sensitivity: &Sensitivity, unit: &'static str) -> ChannelEstimate {
     let (low, high) = sensitivity.bounds();
     BoundedEstimate::new(sensitivity.value, low, high).in_unit(unit)
 }
 
-/// The sensitivities to temperature, to supply and to the specific force along each axis, in this order, and a drift in common with each
-/// of them in their place.
+/// Sensitivities to temperature, supply and the specific force along each axis, in this order, or in their place a drift in common.
 fn sensitivity_proposals(
     profile: &SensorProfile,
     channel: ChannelProfile,
@@ -373,7 +363,6 @@ fn sensitivity_proposals(
     proposals
 }
 
-/// The sensitivity of `channel` to what `regressor` measures.
 fn sensitivity_effect(channel: ChannelProfile, (regressor, of): &(ChannelProfile, Sensitivity)) -> Option<Effect> {
     let (sensitivity, sigmas) = (bounded(of, channel.unit), of.sigmas());
     match regressor.quantity {
@@ -423,8 +412,7 @@ fn shared_drift_effect(
     .into()
 }
 
-/// A line of the spectrum beside what `fit` has; `None` of a band without a name by which the deviation changes less than the tolerance of a
-/// scale factor.
+/// A line beside what `fit` has; `None` of a nameless band that changes the deviation by less than a scale factor's tolerance.
 fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Option<Effect> {
     let model = fit.after();
     if line.shape_p_value < REFUTED {
@@ -458,7 +446,6 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Optio
     Some(SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence: evidence(false) }.into())
 }
 
-/// A line whose amplitude or phase changes.
 fn modulated_line(line: &MergedLine, modulation: &Modulation, unit: &'static str) -> Effect {
     ModulatedLine {
         frequency_hz: line.frequency.bounds(),
@@ -495,7 +482,6 @@ fn unexplained_band(line: &MergedLine, model: &Model, mismatch: BandMismatch) ->
     Some(band.into())
 }
 
-/// Drift that `channel` has in common with others.
 fn common_mode_effect(common: &ChannelsInCommon, channel: ChannelProfile, unit: &'static str) -> Effect {
     CommonMode {
         deviation: common.drift.deviation.in_unit(unit),

@@ -8,7 +8,6 @@ use crate::spectra::spectral_lines::{self, MergedLine};
 use allan_core::Model;
 use measurement::SensorProfile;
 
-/// Evidence in the samples of a channel.
 pub(crate) struct ShownBySamples {
     /// The samples, and the same less the covariates, if the channel depends on any.
     pub series: Series,

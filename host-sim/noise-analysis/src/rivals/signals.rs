@@ -10,10 +10,8 @@ use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
 use crate::spectra::spectral_lines::MergedLine;
 
-/// Seconds in an hour.
 const HOUR_S: f64 = 3600.0;
 
-/// Signals in the samples of a channel.
 #[derive(Clone)]
 pub(crate) struct SampleSignals {
     periodic: Option<PeriodicSignal>,
@@ -32,7 +30,6 @@ impl SampleSignals {
     }
 }
 
-/// Lines of the spectrum of a channel and signals in its samples.
 #[derive(Clone)]
 pub(crate) struct SpectrumProposals {
     pub lines: Vec<MergedLine>,
@@ -41,11 +38,9 @@ pub(crate) struct SpectrumProposals {
     pub decays: Option<DecayingDisturbances>,
     /// Frequencies of the resonances of the curve, Hz, with what they take off its deviance.
     pub bands_of_curve: Vec<(f64, f64)>,
-    /// Resolution of the spectrum, Hz.
     pub resolution_hz: f64,
 }
 
-/// One of them.
 pub(crate) enum SpectrumClaim<'a> {
     Line(&'a MergedLine),
     Chirp(&'a FrequencyTrack),
@@ -78,7 +73,6 @@ impl SpectrumProposals {
     }
 }
 
-/// A signal of a channel in `unit` as it is reported.
 pub(crate) fn proposal(signal: &Signal, unit: &'static str) -> Proposal {
     let origin = Origin::Signal(signal.clone());
     match signal {

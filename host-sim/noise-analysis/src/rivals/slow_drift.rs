@@ -13,7 +13,6 @@ const MIN_GAIN: f64 = 11.3;
 /// Drift that several channels of one quantity have in common, without a measured cause.
 pub(crate) struct ChannelsInCommon {
     pub channels: Vec<ChannelId>,
-    /// Names of the channels.
     pub names: Vec<&'static str>,
     /// Increase of the ln likelihood of the spectra.
     pub gain: f64,

@@ -46,9 +46,7 @@ pub struct Rivalry {
     pub stands: &'static str,
     /// The claim that is not reported beside it.
     pub instead_of: &'static str,
-    /// Under which condition.
     pub condition: &'static str,
-    /// Why.
     pub reason: &'static str,
     rule: Rule,
 }
@@ -68,7 +66,6 @@ enum Rule {
 /// A line of the spectrum of a series, beside what else is known of the series.
 pub(crate) struct LineClaim<'a> {
     pub line: &'a MergedLine,
-    /// Sample period of the series, s.
     pub period_s: f64,
     /// Lines above the frequencies that the series shows.
     pub faster: &'a [MergedLine],
@@ -92,7 +89,6 @@ struct Claim<'a> {
     facts: &'a ChannelFacts,
 }
 
-/// The part of a channel in a cause.
 pub(super) struct CauseClaim<'a> {
     pub effect: &'a Effect,
     pub channel: usize,
@@ -112,7 +108,6 @@ const fn row(
     Rivalry { stands, instead_of, condition, reason, rule }
 }
 
-/// The rows, in their order.
 #[rustfmt::skip]
 pub static RIVALRIES: [Rivalry; 51] = [
     // Lines and signals of the spectrum.
@@ -324,12 +319,10 @@ pub static RIVALRIES: [Rivalry; 51] = [
         Rule::Cause(|of| matches!(of.effect, Effect::TelegraphNoise(telegraph) if of.is_of_period(telegraph)))),
 ];
 
-/// True if a line of the spectrum stands.
 pub(crate) fn stands_as_line(claim: &LineClaim) -> bool {
     !RIVALRIES.iter().any(|row| row.applies_to_line(claim))
 }
 
-/// The lines and signals that stand.
 pub(crate) fn standing_in_spectrum(mut proposals: SpectrumProposals) -> SpectrumProposals {
     for row in &RIVALRIES {
         proposals = row.applied_to_spectrum(proposals);
@@ -343,7 +336,6 @@ pub(crate) fn standing(proposals: Vec<Proposal>, facts: &ChannelFacts) -> Vec<Ef
     merged_axes(standing.into_iter().map(|proposal| proposal.effect))
 }
 
-/// True if what a channel shows is a cause of its own.
 pub(super) fn stands_as_cause(claim: &CauseClaim) -> bool {
     !RIVALRIES.iter().any(|row| row.applies_to_cause(claim))
 }
@@ -413,12 +405,10 @@ impl<'a> Claim<'a> {
         self.all.iter().enumerate().filter(move |(other, _)| *other != at).map(|(_, other)| other)
     }
 
-    /// Number of the term of the curve.
     fn term(&self) -> Option<usize> {
         self.all[self.at].term()
     }
 
-    /// The term of the curve.
     fn kind(&self) -> Option<NoiseTerm> {
         match self.origin() {
             Origin::Term { kind, .. } => Some(*kind),
@@ -460,7 +450,6 @@ impl<'a> Claim<'a> {
         is_of_curve.then(|| self.effect().frequency_hz())?.map(|of| of.value)
     }
 
-    /// Time constant of a process, s.
     fn process_s(&self) -> Option<f64> {
         match self.effect() {
             Effect::MarkovProcess(of) => Some(of.time_constant_s.value),
@@ -563,8 +552,7 @@ impl CauseClaim<'_> {
     }
 }
 
-/// True if the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of `duration_s`
-/// seconds.
+/// True if the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record's `duration_s`.
 fn is_shown(effect: &Effect, duration_s: f64) -> bool {
     let time_constant_s = match effect {
         Effect::MarkovProcess(of) => Some(of.time_constant_s),
@@ -578,7 +566,6 @@ fn is_shown(effect: &Effect, duration_s: f64) -> bool {
     time_constant_s.is_none_or(|of| of.value < duration_s) && (may_be_0 || effect.sizes().all(excludes_0))
 }
 
-/// Evidence against a term of the curve.
 fn refutation(effect: &Effect) -> Option<&Refutation> {
     match effect {
         Effect::Unexplained(Unexplained { observation: Observation::RefutedTerm { by, .. }, .. }) => Some(by),

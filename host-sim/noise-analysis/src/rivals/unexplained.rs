@@ -23,8 +23,7 @@ const MANY: f64 = 1e4;
 const LEVEL_BLOCKS: usize = 64;
 const LEAST_PAIRS: u32 = 100;
 /// Least part of the changes of the level that the temperature explains, and least change of the deviation over the range of the
-/// temperature, %: a supply or a vibration that changes in the course of a record has a course like that of the temperature by
-/// chance.
+/// temperature, %: a supply or a vibration that changes in the course of a record has a course like that of the temperature by chance.
 const LEAST_EXPLAINED: f64 = 0.5;
 const LEAST_CHANGE: f64 = 5.0;
 

@@ -6,8 +6,7 @@
 //! r(k) = Σ exp(−2π²m²·D(k))/(2π²m²) counts², m = 1, 2, …
 //! ```
 //!
-//! uncorrelated with the noise (A. B. Sripad, D. L. Snyder, IEEE Trans. ASSP 25, 1977). D(k) follows from the curve,
-//! octave by octave.
+//! uncorrelated with the noise (A. B. Sripad, D. L. Snyder, IEEE Trans. ASSP 25, 1977). D(k) follows from the curve, octave by octave.
 
 use crate::OCTAVES;
 use crate::distributions::ROUNDING;
@@ -206,9 +205,8 @@ mod tests {
         cascade.curve(1.0).scaled(unit)
     }
 
-    /// Noise of 2.1, 0.9 and 0.8 counts behind the averages, with and without rounding. Tolerance: four standard
-    /// deviations of twice the covariance of rounding and noise (errors correlate over 8 samples), and 2 % for the
-    /// power law; 5 % at one sample.
+    /// Noise of 2.1, 0.9 and 0.8 counts behind the averages, with and without rounding. Tolerance: four standard deviations of twice the
+    /// covariance of rounding and noise (errors correlate over 8 samples), and 2 % for the power law; 5 % at one sample.
     #[test]
     fn the_rounding_of_slow_noise_is_that_of_the_same_noise_unrounded() {
         for (taps, deviation) in [(64, 21.0), (32, 6.0), (16, 4.0)] {

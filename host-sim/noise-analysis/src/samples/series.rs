@@ -12,10 +12,8 @@ pub struct Series {
     pub slots: Arc<[u64]>,
     /// One value for each slot, in [`unit`](Self::unit).
     pub values: Arc<[f64]>,
-    /// Sample periods of the record, or of its part, with or without samples. Channels recorded together have the same
-    /// span.
+    /// Sample periods of the record, or of its part, with or without samples. Channels recorded together have the same span.
     pub span: Range<u64>,
-    /// Sample period, s.
     pub period_s: f64,
     /// Smallest distance of two values, in [`unit`](Self::unit): one count, or several.
     pub resolution: f64,
@@ -85,7 +83,6 @@ impl Series {
         self.slots.last().map_or(0.0, |&slot| slot as f64 * self.period_s)
     }
 
-    /// The samples before the sample period `slot`.
     #[must_use]
     pub fn before(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);
@@ -97,7 +94,6 @@ impl Series {
         }
     }
 
-    /// The samples from the sample period `slot` on.
     #[must_use]
     pub fn from(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);
@@ -134,7 +130,6 @@ impl Series {
         self.filtered(|slot| others.iter_mut().all(|has| has(slot)))
     }
 
-    /// Number of sample periods in which both have a sample.
     #[must_use]
     pub fn count_common(&self, other: &Series) -> usize {
         let mut has = membership(&other.slots);
@@ -149,7 +144,6 @@ impl Series {
         self
     }
 
-    /// The series with the correction applied.
     #[must_use]
     pub fn corrected(self, correction: &Correction) -> Self {
         match correction {

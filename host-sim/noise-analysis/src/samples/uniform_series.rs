@@ -7,7 +7,6 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Samples one period apart; `NaN` is a missing one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UniformSeries {
     sample_period: f64,
@@ -31,8 +30,7 @@ impl UniformSeries {
 
     /// The samples over the span of the record; long gaps split it, and the part with the most samples is returned.
     ///
-    /// A gap is long with more than an eighth of the samples of the longest part between such gaps: drift and lines of
-    /// a record with large gaps leak to all frequencies.
+    /// A gap is long with over an eighth of the samples of the longest part between such gaps: drift and lines leak to all frequencies.
     #[must_use]
     pub fn from_series(series: &Series) -> Self {
         let slots = &series.slots;
@@ -119,8 +117,7 @@ impl UniformSeries {
         mean(self.values.iter().copied())
     }
 
-    /// The series with gaps of up to six samples closed by the best linear interpolation from six neighbours on either
-    /// side, and the replaced share.
+    /// The series with gaps of up to six samples closed by best linear interpolation from six neighbours a side, and the replaced share.
     ///
     /// Zeros in their place would spread power over all frequencies.
     #[must_use]
@@ -185,11 +182,9 @@ impl UniformSeries {
         self.with_values(self.values.iter().enumerate().map(|(at, value)| value - line(at)).collect())
     }
 
-    /// Block averages over the smallest power of two for which fewer than half of the pairs a block apart are equal:
-    /// rounding then acts as noise.
+    /// Block averages over the least power of two at which fewer than half of the pairs a block apart are equal: rounding acts as noise.
     ///
-    /// An output that stays at one step of the quantizer for several samples has a correlated rounding error, which would show
-    /// as lines.
+    /// An output that stays at one step of the quantizer for several samples has a correlated rounding error, which would show as lines.
     pub(crate) fn averaged_until_dithered(self) -> Self {
         let equal_apart = |distance: usize| {
             let pairs = self.values.iter().zip(self.values.iter().skip(distance));
@@ -205,8 +200,7 @@ impl UniformSeries {
         if size == 1 { self } else { self.averaged(size) }
     }
 
-    /// Means of blocks of `size` samples, at `size` times the period: of the samples that are there, where at least half are. An
-    /// incomplete block at the end is left out.
+    /// Means of blocks of `size` samples, at least half of which are there, at `size` times the period; an incomplete last one is left out.
     pub(crate) fn averaged(&self, size: usize) -> Self {
         let average = |chunk: &[f64]| {
             let (sum, count) = chunk

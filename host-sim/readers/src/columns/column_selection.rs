@@ -25,7 +25,6 @@ impl Role {
 pub(crate) struct AvailableColumn {
     /// Its name in the file, or its number, from 0.
     pub(crate) name: String,
-    /// Its unit, if the file says it.
     pub(crate) unit: Option<Unit>,
 }
 
@@ -55,7 +54,6 @@ pub(crate) struct ChosenColumn {
 pub enum SelectionError {
     #[error("no column is named like a channel; say which is which, as in --columns gyro_x=NAME; the file has {0}")]
     NoChannel(String),
-    /// Any other, as told.
     #[error("{0}")]
     Other(String),
 }
@@ -114,7 +112,6 @@ impl ColumnSelection {
         Self { read_by_others: columns, ..self }
     }
 
-    /// True if nothing is stated.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.assignments.is_empty() && self.units.is_empty()
@@ -127,7 +124,6 @@ impl ColumnSelection {
         assigned.into_iter().map(|(role, position)| (role.name(), position)).collect()
     }
 
-    /// Stated unit of the quantity with this base.
     pub(crate) fn stated_unit(&self, base: &str) -> Option<Unit> {
         self.units.iter().copied().find(|unit| unit.base == base)
     }
@@ -309,7 +305,6 @@ impl ColumnSelection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowOptions {
     pub sensor: SensorChannels,
-    /// Columns and units.
     pub selection: ColumnSelection,
     pub topic: Option<String>,
 }
@@ -376,7 +371,6 @@ impl AvailableColumn {
         Some((&self.name[..short.clone().find(is_name).unwrap_or(0)], channel))
     }
 
-    /// The channel of `sensor` by name.
     fn channel(&self, sensor: &SensorChannels) -> Option<SensorChannel> {
         match role_of(&self.name)? {
             NamedRole::Channel(name) => sensor.channel(name),
@@ -398,7 +392,6 @@ impl AvailableColumn {
         self.unit.is_some_and(|unit| unit.base == SECOND)
     }
 
-    /// True for the name of a time.
     pub(crate) fn is_time(&self) -> bool {
         matches!(role_of(&self.name), Some(NamedRole::Time))
     }

@@ -5,7 +5,6 @@ use crate::columns::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
 /// Units of angular rates and specific forces.
 pub(crate) const INERTIAL: [&str; 2] = ["deg/s", "g"];
 
-/// A sensor whose columns are read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorChannels {
     pub name: &'static str,
@@ -13,7 +12,6 @@ pub struct SensorChannels {
     pub channels: Vec<SensorChannel>,
 }
 
-/// One output of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorChannel {
     /// Such as `gyro_x`.
@@ -41,7 +39,6 @@ impl SensorChannels {
         Self { name: "generic", channels: channels.collect() }
     }
 
-    /// The channel named `name`.
     #[must_use]
     pub fn channel(&self, name: &str) -> Option<SensorChannel> {
         self.channels.iter().copied().find(|channel| channel.name == name)

@@ -48,7 +48,6 @@ impl Rows {
         }
     }
 
-    /// The topic of a batch or of messages.
     fn topic(&self, format: Option<&MessageFormat>, rows: u64) -> Topic {
         let topic = Topic { name: self.name(), rows: Some(rows), ..Topic::default() };
         let mut sensor = TopicSensor::default();
@@ -284,7 +283,6 @@ fn scalar(kind: char) -> Option<(Scalar, f64)> {
     })
 }
 
-/// `None` for an unknown type.
 fn field_bytes(kind: char) -> Option<usize> {
     match kind {
         'n' => Some(4),

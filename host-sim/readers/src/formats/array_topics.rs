@@ -41,7 +41,6 @@ pub(crate) struct NamedArray {
 }
 
 impl NamedArray {
-    /// A matrix with numbered columns.
     pub(crate) fn matrix(group: &str, name: &str, rows: usize, columns: usize) -> Self {
         let columns = (0..columns).map(|number| number.to_string()).collect();
         Self { group: group.to_owned(), name: name.to_owned(), rows, columns, ..Self::default() }
@@ -130,7 +129,6 @@ impl WantedColumns<'_> {
 pub(crate) trait ArrayReader: Send {
     const FORMAT: &'static str;
 
-    /// Calls `each` with the rows of the columns.
     fn rows(&mut self, wanted: &WantedColumns, each: &mut EachRow) -> Result<(), Stop>;
 }
 

@@ -225,7 +225,6 @@ pub(crate) enum CalendarColumns {
 struct TimePart {
     names: &'static [&'static str],
     unit_ns: i64,
-    /// Exclusive bound.
     below: i64,
 }
 
@@ -422,7 +421,6 @@ mod tests {
         }
     }
 
-    /// Evenings and nights around a change of date.
     #[test]
     fn one_order_of_day_and_month_is_that_of_the_whole_file() {
         for (month, day) in [(5, 11), (11, 5), (12, 12), (1, 31), (2, 28), (9, 30), (12, 31)] {

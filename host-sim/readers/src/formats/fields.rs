@@ -74,7 +74,8 @@ fn words_before_values(text: &str) -> usize {
 
 pub(crate) fn split(text: &str, separator: Option<char>) -> Fields<'_> {
     // Mostly numbers alone.
-    if !text.contains(' ') || !has_words(text) {
+    let has_blanks = separator.is_none() || text.contains(' ');
+    if !has_blanks || !has_words(text) {
         return Fields::new(text, separator);
     }
     let (words, values) = text.split_at(words_before_values(text));
@@ -123,7 +124,13 @@ impl<'a> Fields<'a> {
     }
 
     /// In brackets, or between commas where these are no separators.
+    #[inline]
     fn first_of_list(&mut self, field: &'a str) -> &'a str {
+        let may_be_list = self.has_lists || field.as_bytes().first() == Some(&b'[');
+        if may_be_list { self.first_of_some_list(field) } else { field }
+    }
+
+    fn first_of_some_list(&mut self, field: &'a str) -> &'a str {
         let inner = if field.as_bytes().first() == Some(&b'[') {
             field.strip_prefix('[').and_then(|field| field.strip_suffix(']')).map(str::trim)
         } else {
@@ -213,6 +220,10 @@ fn is_unit(word: &str) -> bool {
 /// Letters other than those of an exponent, a bracket or an arrow; without branches, as most lines have none.
 fn has_words(text: &str) -> bool {
     let bytes = text.as_bytes();
+    // These, and the arrow, stand behind all digits and signs of numbers.
+    if !bytes.iter().fold(false, |any, byte| any | (*byte >= b'>')) {
+        return false;
+    }
     let is_word = |before: u8, byte: u8| {
         let is_begin = byte.is_ascii_alphabetic() & !before.is_ascii_digit() & (before != b'.');
         is_begin | (byte == b']') | (byte == b'>')

@@ -34,7 +34,6 @@ use tempfile::NamedTempFile;
 /// Several messages of the raw stream.
 pub const HEAD_BYTES: u64 = 1 << 14;
 
-/// The format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileFormat {
     TextTable,
@@ -53,7 +52,6 @@ pub enum FileFormat {
 }
 
 impl FileFormat {
-    /// Name for messages.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -72,7 +70,6 @@ impl FileFormat {
     }
 }
 
-/// First bytes of the binary formats.
 const MAGICS: [(&[u8], FileFormat); 8] = [
     (b"\x93NUMPY", FileFormat::Npy),
     (b"PK\x03\x04", FileFormat::Npz),
@@ -144,7 +141,6 @@ impl InputFile {
         Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
     }
 
-    /// Arrays in memory that are called `name`.
     #[must_use]
     pub fn of_arrays(name: &Path, arrays: Arc<MemoryTable>, monitor: &ReadMonitor) -> Self {
         let empty = FileBytes::in_memory(name, []);
@@ -177,7 +173,6 @@ impl InputFile {
         Ok(Self { name: name.to_owned(), parts, arrays: None, format, monitor: monitor.clone(), budget })
     }
 
-    /// The recognised format.
     pub fn format(&self) -> FileFormat {
         self.format
     }
@@ -205,7 +200,6 @@ impl InputFile {
         &self.name
     }
 
-    /// The monitor of the reading.
     pub fn monitor(&self) -> &ReadMonitor {
         &self.monitor
     }
@@ -242,8 +236,7 @@ impl InputFile {
         Ok(FileRows::new(name, rows, &self.monitor, register))
     }
 
-    /// Content without an analysis, of the named topic or of all inertial sensors; `selection` is the user's, `sensor`
-    /// gives the size of counts.
+    /// Content without an analysis, of the named topic or all inertial sensors; `selection` is the user's, `sensor` gives LSBs.
     ///
     /// # Errors
     /// The file is damaged, or has no rows of numbers.
@@ -258,7 +251,6 @@ impl InputFile {
             FileFormat::TextTable => {
                 let read = |topic: Option<&str>| text_table::read_whole(self.bytes(), topic, &self.monitor);
                 match read(topic) {
-                    // Rows of several kinds.
                     Err(InputError { reason: Reason::SeveralTopics(names), .. }) => {
                         names.split(", ").map(|name| read(Some(name))).collect()
                     }
@@ -388,7 +380,6 @@ fn no_bag() -> Reason {
     Reason::other("is a directory, not a file, and not that of one bag of ROS 2 in .mcap or .db3 files")
 }
 
-/// Interval of looking for a stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A temporary copy of a pipe, until its end or a stop. A thread reads; after a stop it blocks until the process ends.

@@ -53,20 +53,17 @@ pub(crate) fn is_binary(head: &[u8]) -> bool {
     is_foreign || head.contains(&0) || controls * MOST_CONTROLS > head.len()
 }
 
-/// For [a JSON document](is_json_document).
 pub(crate) const JSON_DOCUMENT: Reason = Reason::Foreign {
     what: "a JSON document",
     how: "objects are read that stand one in each line; in Python, of a list of them: \
           pandas.read_json(\"FILE\").to_json(\"FILE.jsonl\", orient=\"records\", lines=True)",
 };
 
-/// For [a report](is_report).
 pub(crate) const REPORT: Reason = Reason::Foreign {
     what: "a report of this program",
     how: "`compare` and `export` take it; `analyze` takes the recording that it was made of",
 };
 
-/// True for the JSON of a report.
 pub(crate) fn is_report(head: &[u8]) -> bool {
     let mut signs = head.iter().filter(|byte| !byte.is_ascii_whitespace());
     br#"{"schema":"#.iter().all(|sign| signs.next() == Some(sign))

@@ -131,7 +131,6 @@ impl Found {
 }
 
 impl Stated {
-    /// Adds attributes of `path`.
     fn with(&self, attributes: &HashMap<String, AttrValue>, path: &str) -> Self {
         let mut stated = self.clone();
         for (name, value) in attributes {

@@ -21,7 +21,6 @@ const MAX_PARTS: usize = 1 << 20;
 const MAX_NAME: u64 = 256;
 const BUFFER_BYTES: usize = 1 << 13;
 
-/// Header, and tag (type, length).
 const HEADER_BYTES: usize = 128;
 const TAG_BYTES: usize = 8;
 const MATRIX: u32 = 14;
@@ -460,7 +459,6 @@ impl Tag {
     }
 }
 
-/// Counts bytes.
 struct Counted<'a> {
     input: &'a mut dyn Read,
     at: u64,

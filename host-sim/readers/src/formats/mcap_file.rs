@@ -207,7 +207,6 @@ fn give(opcode: u8, data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     Ok(McapRecord::decode(opcode, data)?.map_or(Ok(()), each)?)
 }
 
-/// `unpacked` is a buffer.
 fn chunk(data: &[u8], unpacked: &mut Vec<u8>, meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
     let mut fields = Fields(data.get(CRC_AT..).ok_or_else(cut_off)?);
     let crc = fields.take(4).and_then(|bytes| bytes.first_chunk().copied()).map(u32::from_le_bytes);

@@ -13,7 +13,6 @@ pub(crate) struct Sentence<'a> {
 }
 
 impl<'a> Sentence<'a> {
-    /// `None` for another line.
     pub(crate) fn parse(line: &'a str) -> Option<Self> {
         if let Some(content) = line.strip_prefix(['#', '%']) {
             let (content, digits) = content.split_once('*')?;

@@ -32,7 +32,6 @@ pub(crate) struct RowLayout {
     time: usize,
     label: usize,
     value: usize,
-    /// Unit of the row.
     unit: Option<usize>,
 }
 
@@ -165,7 +164,6 @@ impl RowLayout {
     }
 }
 
-/// The channel that a text names.
 fn channel(text: &str) -> Option<&'static str> {
     let column = AvailableColumn::from_heading(text);
     column.prefix_and_channel().map(|(_, channel)| channel).filter(|channel| !["time", "sample"].contains(channel))

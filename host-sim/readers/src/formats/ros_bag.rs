@@ -35,7 +35,6 @@ enum Record<'a> {
     },
     /// Messages of each connection in a chunk.
     ChunkInfo(&'a [u8]),
-    /// A message of a connection.
     Message {
         connection: u32,
         recorded_ns: i64,
@@ -379,7 +378,6 @@ mod tests {
         }
     }
 
-    /// Numbers, and reason of the end.
     fn read(source: &mut RosBagSource) -> (Vec<f64>, Option<String>) {
         let column = source.topics()[0].columns.iter().position(|column| column.name == "x").expect("a column");
         let mut rows = Vec::new();

@@ -42,7 +42,6 @@ fn short(kind: &str) -> String {
     kind.replace("/msg/", "/")
 }
 
-/// `std_msgs`, `geometry_msgs`, `sensor_msgs`.
 fn known(version: RosVersion) -> Definitions {
     let header = match version {
         RosVersion::Ros1 => "uint32 seq\ntime stamp\nstring frame_id",

@@ -6,7 +6,6 @@ use crate::rows::Ending;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Endings, plain and compressed.
 const ENDINGS: [&str; 2] = [".mcap", ".db3"];
 const COMPRESSED: &str = ".zstd";
 

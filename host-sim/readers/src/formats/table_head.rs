@@ -7,7 +7,6 @@ use crate::formats::row_kinds::RowKind;
 use crate::input::delimited_text;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Lines in which the table is sought.
 pub(crate) const HEAD_LINES: usize = 256;
 
 /// Damaged lines within a table.
@@ -31,7 +30,6 @@ pub(crate) struct TableColumns {
 }
 
 impl TableHead {
-    /// `None` without a row.
     pub(crate) fn at_first_row(lines: Vec<Line>) -> Option<Self> {
         let first = lines.iter().position(|(_, text)| is_row(text))?;
         let separator = separator_of(&lines[first].1);
@@ -85,7 +83,6 @@ impl TableHead {
         self.preamble.last().map(|(_, text)| split(text, self.separator).collect()).unwrap_or_default()
     }
 
-    /// Stated rate, Hz.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
         let keyed = || self.value_of(&["rate", "sample_rate", "samplerate", "sampling_rate", "frequency", "fs", "odr"]);
         self.preamble.iter().find_map(|(_, text)| stated_rate(text)).or_else(keyed).filter(|hz| *hz > 0.0)
@@ -407,7 +404,6 @@ fn names(text: &str, separator: Option<char>, width: usize) -> Vec<&str> {
     names.filter(|name| !matches!(*name, "#" | "%")).collect()
 }
 
-/// `None` unless a row of units.
 fn units_of(fields: &[String]) -> Option<Vec<Option<Unit>>> {
     let unit = |field: &String| Unit::parse(field.trim_matches(['[', ']', '(', ')']));
     let units: Vec<Option<Unit>> = fields.iter().map(unit).collect();

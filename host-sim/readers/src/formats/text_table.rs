@@ -210,7 +210,6 @@ impl Opened<'_> {
             }
         };
         let TableColumns { available, width, calendar, heading_line } = head.columns(kind.as_ref());
-        // Other kinds' columns.
         let others: &[usize] = if let Some(RowKind::Filled { others, .. }) = &kind { others } else { &[] };
         let positions: Vec<usize> = (0..available.len()).filter(|at| !others.contains(at)).collect();
         let available: Vec<AvailableColumn> = positions.iter().map(|at| available[*at].clone()).collect();
@@ -507,7 +506,6 @@ struct RowFields {
     are_values: Vec<bool>,
     /// A word for a value in the last row, with its column.
     word: Option<(usize, String)>,
-    /// Units of the columns.
     units: Vec<Option<Unit>>,
 }
 
@@ -565,7 +563,6 @@ impl RowFields {
         let mut filled = 0;
         let mut fault: Option<(usize, Reason)> = None;
         let mut after_date = None;
-        // Sum of the parts of a time.
         let mut parts_ns = Some(0_i64);
         while let Some(field) = after_date.take().or_else(|| fields.next()) {
             let position = found;

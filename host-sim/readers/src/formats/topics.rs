@@ -110,7 +110,6 @@ pub(crate) trait Source: Send {
         vec![(0..self.topics()[topic].columns.len()).collect()]
     }
 
-    /// Rows of `topic` with these columns.
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError>;
 }
 
@@ -248,7 +247,6 @@ pub(crate) struct TopicRows<'a> {
     limits: FileLimits,
 }
 
-/// Limits of a file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FileLimits {
     pub(crate) budget: Budget,

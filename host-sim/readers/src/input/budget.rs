@@ -80,7 +80,6 @@ impl Budget {
     }
 }
 
-/// For nesting beyond `most` levels.
 pub(crate) fn too_deep(most: usize) -> Reason {
     Reason::Limit(format!("nested more than {most} levels deep"))
 }

@@ -102,8 +102,7 @@ impl Lines {
     /// The next non-blank line, trimmed, with its number from 1; Latin-1 unless UTF-8. `None` at the end.
     ///
     /// # Errors
-    /// The file cannot be read or decompressed, or a line before the rows is longer than 65536 bytes, or has control
-    /// characters.
+    /// The file cannot be read or decompressed, or a line before the rows is longer than 65536 bytes or has control characters.
     pub fn next_line(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {
             self.line += 1;
@@ -183,7 +182,6 @@ impl Lines {
         self.are_rows = true;
     }
 
-    /// The number of the last line.
     pub(crate) fn line(&self) -> u64 {
         self.line
     }

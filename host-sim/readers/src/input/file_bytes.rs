@@ -36,12 +36,10 @@ impl From<&Self> for FileBytes {
 }
 
 impl FileBytes {
-    /// Bytes in memory that are called `name`.
     pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Self {
         Self { name: name.to_owned(), copy: Some(BytesCopy::Memory(bytes.into())), cut: None }
     }
 
-    /// The bytes of a temporary file.
     pub fn in_temporary_file(name: &Path, file: NamedTempFile) -> Self {
         Self { name: name.to_owned(), copy: Some(BytesCopy::File(Arc::new(file))), cut: None }
     }
@@ -63,7 +61,6 @@ impl FileBytes {
         Ok(Self { cut, ..Self::in_temporary_file(name, copy) })
     }
 
-    /// The compression whose data end early.
     pub(crate) fn cut(&self) -> Option<&'static str> {
         self.cut
     }
@@ -91,7 +88,6 @@ impl FileBytes {
         }
     }
 
-    /// The first bytes.
     pub fn head(&self, most: u64) -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
         self.open()?.take(most).read_to_end(&mut head)?;
@@ -116,7 +112,6 @@ impl FileBytes {
     }
 }
 
-/// Open bytes.
 pub enum OpenBytes {
     File(File),
     Memory(Cursor<Arc<[u8]>>),

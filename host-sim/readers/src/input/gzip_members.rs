@@ -19,8 +19,7 @@ impl<R: BufRead> GzipMembers<R> {
 
 impl<R: BufRead> Read for GzipMembers<R> {
     /// # Errors
-    /// The kinds are `UnexpectedEof` for a truncated member, `InvalidInput` for a damaged one and `InvalidData` for bytes after
-    /// a member that are no member.
+    /// `UnexpectedEof` for a truncated member, `InvalidInput` for a damaged one, `InvalidData` for other bytes behind a member.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while let Some(member) = &mut self.member {
             let count = member.read(buffer)?;

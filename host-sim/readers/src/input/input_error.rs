@@ -18,7 +18,6 @@ pub struct InputError {
     pub row: Option<u64>,
     /// Name of the column, where one column is at fault.
     pub column: Option<String>,
-    /// Why it is refused.
     pub reason: Reason,
 }
 
@@ -93,23 +92,19 @@ pub enum Reason {
         /// Name of the format.
         format: &'static str,
     },
-    /// Any other, as told.
     #[error("{0}")]
     Other(Cow<'static, str>),
 }
 
 impl Reason {
-    /// A reason that is only told.
     pub fn other(told: impl Into<Cow<'static, str>>) -> Self {
         Self::Other(told.into())
     }
 
-    /// Damage of a file in `format`.
     pub(crate) fn damaged(format: &'static str, error: impl Into<Box<str>>) -> Self {
         Self::Format { format, error: error.into() }
     }
 
-    /// A limit of this program: the file may be intact.
     pub(crate) fn is_limit(&self) -> bool {
         matches!(self, Self::TooManySamples | Self::Limit(_))
     }
@@ -137,12 +132,10 @@ impl InputError {
         Self { file: file.to_owned(), line: None, row: None, column: None, reason }
     }
 
-    /// A fault of one line.
     pub fn line(file: &Path, line: u64, reason: Reason) -> Self {
         Self { file: file.to_owned(), line: Some(line), row: None, column: None, reason }
     }
 
-    /// A fault of one field.
     pub fn field(file: &Path, line: u64, column: &str, reason: Reason) -> Self {
         Self { file: file.to_owned(), line: Some(line), row: None, column: Some(column.to_owned()), reason }
     }

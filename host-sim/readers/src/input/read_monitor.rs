@@ -66,7 +66,6 @@ impl ReadMonitor {
         self.0.bytes.load(Relaxed)
     }
 
-    /// Purpose of the current reading.
     #[must_use]
     pub fn pass(&self) -> ReadPass {
         let passes = [ReadPass::FirstRows, ReadPass::Survey, ReadPass::Samples];
@@ -74,7 +73,6 @@ impl ReadMonitor {
         passes.into_iter().find(|of| *of as u8 == pass).unwrap_or(ReadPass::FirstRows)
     }
 
-    /// Begins a pass.
     pub fn begin_pass(&self, pass: ReadPass) {
         self.0.pass.store(pass as u8, Relaxed);
     }

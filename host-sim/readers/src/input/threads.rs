@@ -18,7 +18,6 @@ pub fn read_on_one_thread<R>(task: impl FnOnce() -> R) -> R {
     task()
 }
 
-/// True if allowed.
 #[must_use]
 pub fn may_begin_threads() -> bool {
     !cfg!(target_family = "wasm") && !IS_ALONE.get()

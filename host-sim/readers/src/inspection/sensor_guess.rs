@@ -9,7 +9,6 @@ use crate::rows::{TopicSensor, WholeTable, usual_unit};
 use std::collections::BTreeMap;
 use time_base::TimeRange;
 
-/// The guessed role of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnGuess {
     /// Or `time` or `sample`.
@@ -348,7 +347,6 @@ impl SensorGuess {
     }
 }
 
-/// For a row's label.
 enum RowLabel {
     Force,
     Rate,
@@ -371,7 +369,6 @@ impl RowLabel {
 const OTHER_NAMES: &str = "lat lon alt easting northing quality yaw pitch roll heading speed press humid volt current batt covariance \
     orientation quat magnetic position temp delta";
 
-/// By name and unit.
 fn may_be_inertial(column: &AvailableColumn) -> bool {
     let name = column.name.to_lowercase();
     let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));
@@ -433,7 +430,6 @@ impl Triples {
                 None => vec![run],
             };
             for part in parts.into_iter().filter(|part| part.len() >= 3) {
-                // Most alike.
                 let of_offset = |offset: usize| (part.start + offset..part.end - 2).step_by(3).collect::<Vec<_>>();
                 let cost = |triples: &Vec<usize>| triples.iter().map(|at| unlike(*at).ln()).sum::<f64>();
                 let offsets = (0..=part.len() % 3).map(of_offset);

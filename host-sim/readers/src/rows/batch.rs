@@ -81,7 +81,6 @@ impl<V> Default for Batch<V> {
 }
 
 impl Batch {
-    /// The rows with their verdicts.
     #[must_use]
     pub fn with_verdicts<V>(self, verdicts: Vec<V>) -> Batch<V> {
         let Self { rows, times, indices, values, backwards, verdicts: _ } = self;

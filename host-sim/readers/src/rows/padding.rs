@@ -14,10 +14,8 @@ pub struct Unpadded {
 }
 
 impl Unpadded {
-    /// All rows.
     pub const ALL: Self = Self { first: 0, end: u64::MAX };
 
-    /// For `rows` rows.
     pub fn note(self, rows: u64) -> String {
         let (before, after) = (self.first, rows - self.end);
         format!(
@@ -35,7 +33,6 @@ impl Unpadded {
     }
 }
 
-/// Looks for padding.
 #[derive(Debug, Default)]
 pub struct PaddingFinder {
     rows: u64,
@@ -46,7 +43,6 @@ pub struct PaddingFinder {
 }
 
 impl PaddingFinder {
-    /// Looks at the next rows.
     pub fn add<V>(&mut self, batch: &Batch<V>) {
         for is_equal in self.before.equals(batch) {
             if is_equal {
@@ -63,7 +59,6 @@ impl PaddingFinder {
         }
     }
 
-    /// Rows that were looked at.
     pub fn rows(&self) -> u64 {
         self.rows
     }

@@ -28,7 +28,6 @@ pub struct ColumnQuantizer {
 }
 
 impl ColumnQuantizer {
-    /// Numbers that are counts.
     pub const COUNTS: Self = Self { lsb: 1.0, offset: 0.0, cost: None };
 
     /// For finite `values`.
@@ -157,7 +156,6 @@ pub(crate) fn difference_noise(values: &[f64]) -> f64 {
     noise_at_lag(values, 1)
 }
 
-/// Values `lag` apart.
 pub(crate) fn noise_at_lag(values: &[f64], lag: usize) -> f64 {
     let stride = values.len().div_ceil(1 << 17).max(1);
     let pairs = values.windows(lag + 1).step_by(stride).map(|pair| pair[lag] - pair[0]);

@@ -22,7 +22,6 @@ pub(crate) enum Refusal {
 
 #[derive(Debug, Default)]
 pub(crate) struct Ending {
-    /// The source ends early.
     pub(crate) damage: Option<Reason>,
     pub(crate) notes: Vec<ReadingNote>,
 }
@@ -66,7 +65,6 @@ pub struct WantedRows {
 }
 
 impl WantedRows {
-    /// All of them.
     pub fn all(stated_hz: Option<f64>) -> Self {
         Self { part: None, stated_hz, most_rows: u64::MAX, batch_rows: BATCH }
     }
@@ -91,7 +89,6 @@ impl RowsRead {
     }
 }
 
-/// Keeps the rows of a part.
 pub struct PartFilter {
     part: Option<TimeRange>,
     period_s: Option<f64>,
@@ -142,10 +139,8 @@ impl PartFilter {
         Ok(self.last_s < to_s)
     }
 
-    /// The part must have rows.
-    ///
     /// # Errors
-    /// It has none.
+    /// The part has no rows.
     pub fn finish(&self) -> Result<(), TimeBaseError> {
         match self.part {
             Some(TimeRange { from_s, to_s }) if self.kept == 0 => {
@@ -156,7 +151,6 @@ impl PartFilter {
     }
 }
 
-/// The rows of a file.
 pub struct FileRows<'a> {
     file: &'a Path,
     source: Box<dyn RowSource + 'a>,
@@ -199,13 +193,11 @@ impl<'a> FileRows<'a> {
         Self { file, source, columns, monitor: monitor.clone() }
     }
 
-    /// The channels that are read.
     #[must_use]
     pub fn columns(&self) -> &[ValueColumn] {
         &self.columns
     }
 
-    /// Who watches the reading.
     #[must_use]
     pub fn monitor(&self) -> &ReadMonitor {
         &self.monitor

@@ -33,12 +33,10 @@ pub(crate) struct TopicSensor {
 }
 
 impl TopicSensor {
-    /// True if it has the channel.
     pub(crate) fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|(name, ..)| *name == channel)
     }
 
-    /// In `unit`.
     pub(crate) fn add_axes(&mut self, channels: [&'static str; 3], positions: [usize; 3], unit: &str) {
         let unit = Unit::parse(unit);
         self.columns.extend(channels.into_iter().zip(positions).map(|(channel, at)| (channel, at, unit)));

@@ -21,8 +21,7 @@ pub(crate) fn is_header(header: &str) -> bool {
 
 /// Writes a table, gzip for a name in `.gz`.
 ///
-/// Columns: `sample` and `time_s`, if every sample has them, and counts. Neither faults nor the gyroscopes' range is in
-/// it.
+/// Columns: `sample` and `time_s`, if every sample has them, and counts. Faults and the gyroscopes' range are left out.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<()> {
     write_text(file, |out| write_rows(recording, out))
 }

@@ -83,7 +83,6 @@ impl<W: Write> FrameLogWriter<W> {
         Self { out, is_gzip: false, text: format!("{HEADER}\n"), written: None }
     }
 
-    /// Adds one frame.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
         let (before, text) = (self.text.len(), &mut self.text);
         let _ = write!(text, "{},", frame.time_s);

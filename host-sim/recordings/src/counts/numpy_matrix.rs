@@ -63,7 +63,6 @@ impl MatrixWriter {
     }
 }
 
-/// The unit of a column in SI.
 pub(crate) struct SiUnit {
     pub(crate) suffix: &'static str,
     /// From the channel's unit.

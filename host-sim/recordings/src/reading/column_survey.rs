@@ -98,7 +98,6 @@ impl ColumnSurvey {
         self.is_usable && !self.has_other_than_zero
     }
 
-    /// True in a kept run.
     fn is_kept(&self) -> bool {
         (self.seen / RUN).is_multiple_of(1 << self.thinned)
     }

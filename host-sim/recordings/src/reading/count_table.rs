@@ -37,8 +37,7 @@ fn recorded<E: From<InputError>>(
 
 type TakeRow<'a> = dyn FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason> + 'a;
 
-/// Calls `take` with the channels and each row: time stamp and counts, absent channels as in [`NOT_RECORDED`]. Returns
-/// the reason if the table ends early.
+/// Calls `take` with channels and each row: stamp and counts, absent ones as in [`NOT_RECORDED`]; returns the reason of an early end.
 ///
 /// # Errors
 /// As [`read`], and what `take` refuses.

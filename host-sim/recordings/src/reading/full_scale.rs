@@ -52,7 +52,6 @@ impl FullScale {
         }
     }
 
-    /// Refused numbers are NaN.
     fn add(&mut self, columns: &[ProfiledColumn], row: u64, numbers: impl Iterator<Item = f64>) {
         let mut mask = 0u128;
         for (at, (number, column)) in numbers.zip(columns).take(MOST_COLUMNS).enumerate() {

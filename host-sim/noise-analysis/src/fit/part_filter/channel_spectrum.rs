@@ -60,7 +60,6 @@ impl ChannelSpectrum {
         self.spectrum.bands() as f64
     }
 
-    /// The least deviance without a filter.
     pub(super) fn unfiltered(&self) -> f64 {
         self.behind(NoiseTerm::AngleRandomWalk).deviance(&self.spectrum.shape(NoiseTerm::AngleRandomWalk))
     }

@@ -21,8 +21,7 @@ pub(super) enum Family {
     EveryValue(MovingAverageFilter),
     /// Moving averages that are read slowly.
     ReadSlowly(MovingAverageFilter),
-    /// A low-pass filter of the second order: the analog one of a part, or the digital one of a flight controller whose own rate is high against
-    /// that of the samples.
+    /// A low-pass filter of the second order: an analog one, or a digital one whose own rate is high against that of the samples.
     LowPass(fn(f64) -> LowPass),
 }
 
@@ -53,8 +52,7 @@ impl Family {
         }
     }
 
-    /// The decimations, or frequencies, that are tried at a sample rate, rising: from just above 1 to the length of the filter, beyond which no
-    /// two samples are correlated.
+    /// The decimations or frequencies that are tried, rising: from just above 1 to the filter's length, where no samples correlate.
     pub(super) fn tried(self, rate_hz: f64) -> Vec<f64> {
         match self {
             Self::EveryValue(_) => vec![1.0],

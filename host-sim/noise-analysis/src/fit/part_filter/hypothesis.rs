@@ -27,7 +27,6 @@ pub(super) struct Hypothesis {
     pub(super) adjusted: f64,
     /// Between these the deviance has no other minimum.
     range: (f64, f64),
-    /// One of each channel.
     pub(super) deviances: Vec<f64>,
 }
 
@@ -45,7 +44,6 @@ impl<'a> TriedFamily<'a> {
         Some(Self { channels, family, tried: tried.into_iter().map(tried_at).collect() })
     }
 
-    /// The deviances of each channel.
     pub(super) fn deviances(&self) -> impl Iterator<Item = &[f64]> {
         self.tried.iter().map(|(_, deviances)| deviances.as_slice())
     }
@@ -90,7 +88,6 @@ impl<'a> TriedFamily<'a> {
 }
 
 impl Hypothesis {
-    /// White noise behind it.
     pub(super) fn term(&self) -> NoiseTerm {
         self.family.with(self.adjusted)
     }

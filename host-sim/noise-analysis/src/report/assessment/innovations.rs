@@ -37,8 +37,7 @@ pub struct Innovations {
 }
 
 impl Innovations {
-    /// Probability that a true model, fitted to as long a stretch as this one, claims as small an error: the mean squares of both
-    /// stretches scatter.
+    /// Probability that a true model, fitted to as long a stretch, claims as small an error: the mean squares of both scatter.
     #[must_use]
     pub fn chance_of_small_claim(&self) -> f64 {
         // A square of a normal number is worth half an exponential one.
@@ -136,10 +135,9 @@ struct KalmanFilter {
 impl KalmanFilter {
     /// The filter of `model` for blocks of `size` samples.
     ///
-    /// Its states are a random walk for K, a Markov process for each octave of B up to four times `duration` (the sum of
-    /// their densities approximates flicker noise), one for each Markov term, and a rotating pair for each resonance or
-    /// sinusoid below a quarter of the block rate. The rest of the Allan variance at the length of a block is white
-    /// measurement noise, at least a thousandth of it.
+    /// Its states are a random walk for K, a Markov process for each octave of B up to four times `duration` (the sum of their densities
+    /// approximates flicker noise), one for each Markov term, and a rotating pair for each resonance or sinusoid below a quarter of the
+    /// block rate. The rest of the Allan variance at the length of a block is white measurement noise, at least a thousandth of it.
     fn from_model(model: &Model, size: usize, duration: f64) -> Option<Self> {
         let block = size as f64 * model.sample_period();
         let variance = model.avar(size as u64);
@@ -197,8 +195,7 @@ impl KalmanFilter {
         Self { modes, observation, measurement_noise, state: DVector::zeros(size), covariance }
     }
 
-    /// Updates the state with the measurement of a block, if there is one, and predicts the next block. Returns the
-    /// innovation over its expected standard deviation.
+    /// Updates the state with a block, if it is measured, and predicts the next one. Returns the innovation over its expected deviation.
     fn step(&mut self, measured: Option<f64>) -> Option<f64> {
         let innovation = measured.map(|measured| {
             let gain = &self.covariance * &self.observation;

@@ -22,9 +22,7 @@ const MAX_MISSING: f64 = 0.1;
 /// Standard deviation of the integral after a time, in the channel's unit times s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegratedError {
-    /// Time of integration, s.
     pub seconds: f64,
-    /// By the model.
     pub predicted: f64,
     /// Measured in the data; absent if the record is too short.
     pub observed: Option<ObservedError>,
@@ -33,7 +31,6 @@ pub struct IntegratedError {
 /// Root mean square over many starts, in the channel's unit times s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObservedError {
-    /// Root mean square.
     pub value: f64,
     /// Lower 95 % bound, by χ².
     pub low: f64,
@@ -77,8 +74,7 @@ impl Contrast {
     /// Covariance of two errors whose starts are `lag` samples apart, in the square of the channel's unit.
     fn covariance(&self, model: &Model, lag: usize) -> f64 {
         let ratio = self.time as f64 / self.calibration as f64;
-        // Position and weight of the running sum at the start, the end of the calibration and the end. The weights and their
-        // first moments add up to 0.
+        // Position and weight of the running sum at the start, the end of the calibration and the end: weights and first moments add to 0.
         let (c, t) = (self.calibration as f64, self.time as f64);
         let weights = [(-c, ratio), (0.0, -1.0 - ratio), (t, 1.0)];
         let sum_variance = |m: f64| -> f64 {

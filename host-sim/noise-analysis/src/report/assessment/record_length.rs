@@ -10,8 +10,7 @@ pub const REQUIRED_HALF_WIDTH: f64 = 0.2;
 /// Longest record that is recommended, s: 30 days.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
 
-/// Record length in s, at least `duration`, at which the 95 % bounds of the coefficient at position `term` of `model` are
-/// within ±[`REQUIRED_HALF_WIDTH`].
+/// Record length, s, at least `duration`, at which the coefficient at position `term` has bounds within ±[`REQUIRED_HALF_WIDTH`].
 ///
 /// By [`relative_error`], times the factor by which the bounds that the fit gave for `duration` s are wider, if they are.
 /// The bounds of a sinusoid or a ramp, which have no density, narrow at least with the square root of the length.

@@ -24,13 +24,11 @@ impl Comb {
     }
 }
 
-/// All lines of a record.
 struct Lines<'f> {
     frequencies: &'f [Frequency],
     duration_s: f64,
 }
 
-/// A line at one of the frequencies of a comb.
 struct Member {
     number: usize,
     tooth: Tooth,

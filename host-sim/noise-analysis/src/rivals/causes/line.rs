@@ -31,7 +31,6 @@ impl Tooth {
 pub(super) struct Line {
     pub(super) channel: usize,
     pub(super) effect: Effect,
-    /// Its evidence.
     pub(super) evidence: LineEvidence,
     /// Hz, with its bounds.
     pub(super) frequency_hz: BoundedEstimate,

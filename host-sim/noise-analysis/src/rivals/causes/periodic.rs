@@ -1,5 +1,4 @@
-//! Periodic causes: lines of several channels at one frequency, the harmonics and sidebands of one fundamental, and lines whose
-//! amplitude changes.
+//! Periodic causes: lines of several channels at one frequency, harmonics and sidebands of a fundamental, lines whose amplitude changes.
 //!
 //! ```text
 //! effects of every channel ─► line (by frequency) ─► comb (which belong together) ─► waveform (what it is)

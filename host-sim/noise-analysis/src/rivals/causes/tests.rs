@@ -228,8 +228,7 @@ fn knocks_at_one_time_are_one_cause() {
     assert_eq!(causes(&channels), [("knock", vec![0, 1]), ("knock", vec![1])]);
 }
 
-/// A size in the first half and in the whole record, as a mean of two halves with errors of 1: the whole has an error of
-/// 1/√2.
+/// A size in the first half and in the whole record, as a mean of two halves with errors of 1: the whole has an error of 1/√2.
 fn validated(random: &mut ChaCha8Rng, sizes: [f64; 2]) -> Validation {
     let [first, second] = sizes.map(|size| size + random.sample::<f64, _>(StandardNormal));
     let effect = |size: f64, error: f64| {

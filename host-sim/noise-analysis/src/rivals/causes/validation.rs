@@ -1,11 +1,10 @@
 //! Test of the first half's findings on the second half of a record.
 //!
-//! The first half is analysed by itself, as if there were nothing else. If an effect holds throughout, its parameters in the
-//! first half and in the whole record are two estimates of the same numbers, the second of which uses all the samples of
-//! the first. For such a pair of efficient estimates the variance of the difference is the difference of the variances
-//! (J. Hausman, "Specification tests in econometrics", Econometrica 46, 1978); with two halves of equal information it is
-//! half the variance of the first. So the test needs no threshold of detection in the second half: an effect that is
-//! missing there moves the estimate of the whole record.
+//! The first half is analysed by itself, as if there were nothing else. If an effect holds throughout, its parameters in the first half and
+//! in the whole record are two estimates of the same numbers, the second of which uses all the samples of the first. For such a pair of
+//! efficient estimates the variance of the difference is the difference of the variances (J. Hausman, "Specification tests in
+//! econometrics", Econometrica 46, 1978); with two halves of equal information it is half the variance of the first. So the test needs no
+//! threshold of detection in the second half: an effect that is missing there moves the estimate of the whole record.
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, upper_tail};
@@ -17,7 +16,6 @@ const LEVEL: f64 = 0.01;
 /// Farthest that the lines of two halves may be apart, as a part of their frequency, to be taken for the same line.
 const FARTHEST_LINE: f64 = 0.1;
 
-/// True if an effect of the first half may be the same as one of the whole record.
 pub(super) fn is_same(whole: &Effect, half: &Effect) -> bool {
     match (whole.is_line(), half.is_line()) {
         (true, true) => distance(whole, half) < FARTHEST_LINE,

@@ -19,11 +19,9 @@ const SQUARE_TOLERANCE: f64 = 0.36;
 /// amplitudes are spread evenly over the logarithm of two decades: ln(1.36/0.64)/ln 100.
 pub(super) const SQUARE_BY_CHANCE: f64 = 0.164;
 
-/// Least deviation of the higher harmonics of a signal that is no sinusoid, over that of its fundamental: that of a square wave,
-/// `√(π²/8 − 1)`.
+/// Least deviation of the higher harmonics of a signal that is no sinusoid over its fundamental's: a square wave's, `√(π²/8 − 1)`.
 const NO_SINUSOID: f64 = 0.483;
 
-/// The lines of each channel among these frequencies.
 pub(super) fn by_channel<'f>(
     members: impl IntoIterator<Item = (Tooth, &'f Frequency)>,
 ) -> BTreeMap<usize, Vec<(Tooth, Line)>> {
@@ -36,7 +34,6 @@ pub(super) fn by_channel<'f>(
     channels
 }
 
-/// The line of a channel at a multiple of the fundamental.
 fn harmonic(lines: &[(Tooth, Line)], number: u32) -> Option<&Line> {
     lines.iter().find(|(tooth, _)| tooth.multiple() == Some(number)).map(|(_, line)| line)
 }
@@ -164,7 +161,6 @@ pub(super) fn periodic(lines: &[(Tooth, Line)]) -> Effect {
     }
 }
 
-/// The multiples of the fundamental that these lines are.
 fn multiples(lines: &[(Tooth, Line)]) -> Multiples {
     let harmonics: Vec<u32> = lines.iter().filter_map(|(tooth, _)| tooth.multiple()).collect();
     Multiples { sidebands: lines.len() - harmonics.len(), harmonics }

@@ -17,7 +17,6 @@ enum Claims {
 }
 
 impl Claims {
-    /// Names of what stands by these rows.
     fn standing(&self, rows: &[&Rivalry]) -> Vec<&'static str> {
         match self {
             Self::Line { line, faster, left, gain } => {
